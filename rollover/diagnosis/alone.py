@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.local_search import timed
+from rollover.diagnosis.fit.local_search import with_time_shift_search
 from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.grades import share_of, shares
 from rollover.diagnosis.inference.adequacy import is_tolerated
@@ -15,22 +15,22 @@ from rollover.diagnosis.inference.residual_law import fitted_law
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import Explanation, kind_of
-from rollover.diagnosis.selection.forward_step import confusion, is_at_an_end, step
+from rollover.diagnosis.selection.forward_step import confusion, ends_at_bound, step
 from rollover.diagnosis.selection.scan import look
-from rollover.diagnosis.selection.stepwise import as_conditioned
+from rollover.diagnosis.selection.stepwise import with_conditions_refitted
 from rollover.diagnosis.settings import SETTINGS
 from rollover.scenario import Scenario
 
 TUNING = SETTINGS.report.grades
 
 
-def explained_by_one(inquiry: Inquiry, base: Fitted) -> Explanation:
+def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
     """The best single effect beside a discrepancy, if any can be fitted.
 
     It is looked for though the discrepancy may be enough: that was estimated from what an effect leaves as well.
     """
     problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
-    base = timed(problem, base)
+    base = with_time_shift_search(problem, base)
     before = mismatch_of(problem.dataset, base.blocks, phases)
     looked = look(problem, base, inquiry.candidates, groups, parallel_map=inquiry.executor.parallel_map)
     first = step(inquiry, base, looked)
@@ -38,7 +38,9 @@ def explained_by_one(inquiry: Inquiry, base: Fitted) -> Explanation:
         return Explanation(
             base=base, fitted=base, parts=(), looked=looked, detectable=looked.detectable, before=before, after=before
         )
-    first, left = as_conditioned(problem, first, mismatch_of(problem.dataset, first.fitted.blocks, phases), phases)
+    first, left = with_conditions_refitted(
+        problem, first, mismatch_of(problem.dataset, first.fitted.blocks, phases), phases
+    )
     first = first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map)
     return Explanation(
         base=first.base,
@@ -52,7 +54,7 @@ def explained_by_one(inquiry: Inquiry, base: Fitted) -> Explanation:
     )
 
 
-def decided_beside(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:
+def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:
     """The verdict on what one effect explains beside a discrepancy.
 
     An effect predicts recordings that were held out, a discrepancy does not carry over to them but for what is common
@@ -87,7 +89,7 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
     best, start = one.fitted, float(held_out(one.base, groups).left.sum())
     least = TUNING.nearly_all * (start - float(held_out(best, groups).left.sum()))
     for rival in one.rivals:
-        becomes_best = len(rival.x) > len(best.x) and is_at_an_end(rival)
+        becomes_best = len(rival.x) > len(best.x) and ends_at_bound(rival)
         if becomes_best or any(rival is f for f in near):
             continue
         is_akin = is_tolerated(problem, rival) or rival.candidates[-1].family == best.candidates[-1].family

@@ -48,7 +48,7 @@ def diagnosed(
     sensors_first.check(chosen, known)
     held = held_out(list(known), listed(hold_out)) if hold_out else []
     with Executor(workers) as executor:
-        findings = sensors_first.prechecked(chosen, known)
+        findings = sensors_first.sensor_precheck(chosen, known)
         return sensors_first.diagnosed(
             chosen,
             known,

@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from rollover.diagnosis.alone import alike_beside, decided_beside, explained_by_one
-from rollover.diagnosis.data.dataset import Dataset, doubted_beside, left_out
-from rollover.diagnosis.data.inconsistent import Aside, by_inconsistencies
+from rollover.diagnosis.alone import alike_beside, fit_single_effect, verdict_on_single_effect
+from rollover.diagnosis.data.dataset import Dataset, left_out, with_uncertain_conditions_at
+from rollover.diagnosis.data.inconsistent import Aside, inconsistency_evidence
 from rollover.diagnosis.data.phases import phases_of
-from rollover.diagnosis.data.repeatability import differing
+from rollover.diagnosis.data.repeatability import inconsistent_repeats
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.local_search import conditioned, is_doubtful
+from rollover.diagnosis.fit.local_search import has_uncertain_conditions, refitted_with_conditions
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.fit.time_shift import align
@@ -22,22 +22,22 @@ from rollover.diagnosis.grades import graded, with_shares
 from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
 from rollover.diagnosis.inference.discrepancy import Discrepancy
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
-from rollover.diagnosis.inference.recording_faults import RecordingFault, broken_off, by_themselves, misread
-from rollover.diagnosis.invariants import barred, clear_of_null, is_noise_alone, next_best
-from rollover.diagnosis.noise.offsets import by_zeros
-from rollover.diagnosis.noise.truncation import left_aside
-from rollover.diagnosis.power import nothing_told
-from rollover.diagnosis.prepared import trusted
+from rollover.diagnosis.inference.recording_faults import RecordingFault, intrinsic_faults, misread, truncation_fault
+from rollover.diagnosis.invariants import clear_of_null, is_noise_alone, next_best, rejected_effects
+from rollover.diagnosis.noise.offsets import zero_notes
+from rollover.diagnosis.noise.truncation import truncation_notes
+from rollover.diagnosis.power import cannot_tell
+from rollover.diagnosis.prepared import weighted_datasets
 from rollover.diagnosis.result import Answer, Diagnosis, Named, Verdict
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import (
     Explanation,
-    by_the_first,
-    decided,
-    done_by_others,
+    by_first_effect,
     explained,
+    redundant_effects,
     takes_little,
+    verdict_on,
 )
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
@@ -111,13 +111,13 @@ def concluded(
     executor, began, names = asked.executor, asked.began, list(asked.recordings)
     assert scenario is not None
     notes = [*notes, *(inconsistency.says() for inconsistency in inconsistencies)]
-    found = trusted(scenario, [e for e in every if e.name not in hold_out])
-    kept = [e for e in trusted(scenario, every) if e.name in hold_out] if hold_out else []
+    found = weighted_datasets(scenario, [e for e in every if e.name not in hold_out])
+    kept = [e for e in weighted_datasets(scenario, every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < TUNING.least_samples:
-        return nothing_told(every, names, notes, began, by_inconsistencies(inconsistencies))
-    notes += [*left_aside(every, found), *by_zeros(found)]
+        return cannot_tell(every, names, notes, began, inconsistency_evidence(inconsistencies))
+    notes += [*truncation_notes(every, found), *zero_notes(found)]
     groups = left_out(found)
-    notes += differing(found)
+    notes += inconsistent_repeats(found)
     is_cross_validated = len(groups) > 1 or bool(kept)
     if not is_cross_validated:
         notes.append("one condition only: what stands as held out is predicted by the fit to it")
@@ -126,7 +126,7 @@ def concluded(
     align(problem)
     base = problem.fit((), ())
     if base is None:
-        return nothing_told(every, names, [*notes, "the scenario itself could not be simulated"], began)
+        return cannot_tell(every, names, [*notes, "the scenario itself could not be simulated"], began)
     phases = [phases_of(e) for e in found]
     set_ups = tuple(set_up(scenario, e.recording) for e in found)
     acts = "rollover" if any(map(unfit, set_ups)) else "drop"
@@ -165,31 +165,35 @@ def weighed(
     found, notes = list(problem.dataset), list(notes)
     is_beside = asked.discrepancy is not None and asked.discrepancy.is_estimated
     if is_beside:
-        explanation = tried = explained_by_one(inquiry, base)
+        explanation = tried = fit_single_effect(inquiry, base)
     else:
         explanation = tried = explained(inquiry, base)
 
     def decide(found: Explanation) -> tuple[Explanation, Verdict]:
-        return decided_beside(problem, found, groups) if is_beside else decided(problem, found, groups, phases)
+        return (
+            verdict_on_single_effect(problem, found, groups)
+            if is_beside
+            else verdict_on(problem, found, groups, phases)
+        )
 
     def name_all(found: Explanation, verdict: str) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
         alike = partial(alike_beside, problem, groups=groups) if is_beside else None
-        return _named_beside(problem, found, verdict, kept, groups, phases, alike)
+        return _refitted_explanation(problem, found, verdict, kept, groups, phases, alike)
 
     explanation, verdict = decide(explanation)
     held, named_so = problem.dataset, name_all(explanation, verdict)
     nothing: set[str] = set()
     while (
-        more := done_by_others(problem, named_so[0], interval_contains_null(named_so[1], problem.effort.is_ensemble))
+        more := redundant_effects(problem, named_so[0], interval_contains_null(named_so[1], problem.effort.is_ensemble))
         - nothing
     ):
         # what may as well be nothing is none of it: what came first explains what there is alone, or nothing does
         nothing |= more
         problem.with_noise_model(held)
-        alone = by_the_first(problem, explanation, nothing, phases)
+        alone = by_first_effect(problem, explanation, nothing, phases)
         explanation, verdict = decide(alone)
         named_so = name_all(explanation, verdict)
-    while asked.estimates and (more := barred(problem, named_so[0], named_so[1], groups) - nothing):
+    while asked.estimates and (more := rejected_effects(problem, named_so[0], named_so[1], groups) - nothing):
         nothing |= more
         problem.with_noise_model(held)
         explanation, verdict = decide(next_best(problem, explanation, nothing, groups, phases))
@@ -209,13 +213,15 @@ def weighed(
         verdict, effects, explanation = "no-mismatch" if slight else "unexplained", (), explanation.refused()
     shown = None
     if verdict == "no-mismatch":
-        shown = by_themselves(found, recordings, phases, explanation.p_value) or misread(
+        shown = intrinsic_faults(found, recordings, phases, explanation.p_value) or misread(
             inconsistencies, len(found), explanation.p_value
         )
     elif effects and takes_little(explanation, groups, TUNING.main_share):
         # what is lost again and again is met by no effect, and bends those that are fitted to it
-        shown = broken_off(found, recordings, phases, explanation.p_value)
-        if shown is not None and not (takes_little(explanation, groups) or shown.is_of(e.channel for e in effects)):
+        shown = truncation_fault(found, recordings, phases, explanation.p_value)
+        if shown is not None and not (
+            takes_little(explanation, groups) or shown.is_covered_by(e.channel for e in effects)
+        ):
             shown = None  # what another channel loses is no reason to doubt them
     if shown is not None:
         verdict, effects = shown.verdict, shown.effects
@@ -241,7 +247,7 @@ def weighed(
     )
 
 
-def _named_beside(
+def _refitted_explanation(
     problem: Problem,
     explanation: Explanation,
     verdict: str,
@@ -251,17 +257,17 @@ def _named_beside(
     alike: Callable[[Step], Sequence[Fitted]] | None,
 ) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
     """An explanation eased beside its effects, these with their numbers if the verdict names any, and the kept ones."""
-    whole, kept = marginalised_beside(problem, explanation, kept, phases)
+    whole, kept = marginalised_at_fit(problem, explanation, kept, phases)
     return whole, named(problem, whole, groups, alike) if verdict in NAMING else (), kept
 
 
-def marginalised_beside(
+def marginalised_at_fit(
     problem: Problem, explanation: Explanation, kept: Sequence[Dataset], phases: Sequence[Sequence[tuple[float, str]]]
 ) -> tuple[Explanation, list[Dataset]]:
     """The explanation fitted again with what the conditions leave uncertain as it acts beside it; kept ones too."""
-    if not explanation.parts or not is_doubtful(problem):
+    if not explanation.parts or not has_uncertain_conditions(problem):
         return explanation, list(kept)
-    fitted = conditioned(problem, explanation.fitted)
+    fitted = refitted_with_conditions(problem, explanation.fitted)
     beside = problem.changes(fitted.candidates, fitted.x)
     after = mismatch_of(problem.dataset, fitted.blocks, phases)
-    return replace(explanation, fitted=fitted, after=after), [doubted_beside(e, beside) for e in kept]
+    return replace(explanation, fitted=fitted, after=after), [with_uncertain_conditions_at(e, beside) for e in kept]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own
+from rollover.diagnosis.fit.parameterisation import Candidate, with_slices
 from rollover.diagnosis.fit.step import Groups
 from rollover.diagnosis.result import Answer, Named, Share, Verdict
 from rollover.diagnosis.selection.decision import Explanation
@@ -50,7 +50,7 @@ def share_of(problem: Problem, base: Fitted, fitted: Fitted, groups: Groups) -> 
 
 def _due(problem: Problem, base: Fitted, groups: Groups) -> Array:
     """What a base leaves of each recording held out beyond what noise does, (recordings,)."""
-    noise = np.array([_by_noise(e) for e in problem.dataset])
+    noise = np.array([_noise_sum_of_squares(e) for e in problem.dataset])
     return np.asarray(held_out(base, groups).left - noise)
 
 
@@ -69,7 +69,7 @@ def jackknifed(gained: Array, due: Array, groups: Groups) -> Share:
     return Share(share=min(share, 1.0), low=share - wide, high=min(share + wide, 1.0))
 
 
-def _by_noise(e: Dataset) -> float:
+def _noise_sum_of_squares(e: Dataset) -> float:
     """Sum of squares that the noise alone leaves of a recording beside a discrepancy."""
     return float(sum(s.rows.size * min(s.noise / s.sigma, 1.0) ** 2 for s in e.signals))
 
@@ -82,7 +82,7 @@ def with_shares(
     # where a run is dear, what was simulated without an effect stands for the others as they are
     bases = {s.fitted.candidates[-1].key: s.base for s in found.parts} if problem.effort.is_ensemble else {}
     told = []
-    for k, (c, own) in enumerate(each_with_own(found.fitted.candidates)):
+    for k, (c, own) in enumerate(with_slices(found.fitted.candidates)):
         others = [o for j, o in enumerate(found.fitted.candidates) if j != k]
         x = [v for j, v in enumerate(found.fitted.x) if not own.start <= j < own.stop]
         if c.key in bases:

@@ -16,10 +16,10 @@ from rollover.diagnosis.inference.intervals import held_at
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.result import Diagnosis, Named
 from rollover.diagnosis.selection.decision import Explanation
-from rollover.diagnosis.selection.forward_step import is_at_an_end
-from rollover.diagnosis.selection.stepwise import as_conditioned
+from rollover.diagnosis.selection.forward_step import ends_at_bound
+from rollover.diagnosis.selection.stepwise import with_conditions_refitted
 from rollover.diagnosis.settings import SETTINGS
-from rollover.diagnosis.statements import is_none
+from rollover.diagnosis.statements import is_null_effect
 from rollover.effects import EFFECTS
 
 NAMING = ("parameter", "sensor", "missing-physics")  # verdicts that name effects
@@ -36,7 +36,7 @@ def at_bounds(effects: Sequence[Named]) -> set[str]:
     }
 
 
-def barred(problem: Problem, found: Explanation, effects: Sequence[Named], groups: Groups) -> set[str]:
+def rejected_effects(problem: Problem, found: Explanation, effects: Sequence[Named], groups: Groups) -> set[str]:
     """Ids of effects that are no finding: at a bound, maybe null, or predicting worse than nothing does.
 
     Of an effect alone the misfit itself is asked whether it may be null, slopes only of one beside others.
@@ -51,7 +51,7 @@ def barred(problem: Problem, found: Explanation, effects: Sequence[Named], group
 
 def may_be_null(effect: Named) -> bool:
     """Whether its interval holds its null; what does something at its least strength already is there all the same."""
-    return is_none(effect) and not EFFECTS[effect.id].is_sudden
+    return is_null_effect(effect) and not EFFECTS[effect.id].is_sudden
 
 
 def holds_null(effect: Named) -> bool:
@@ -131,12 +131,12 @@ def next_best(
     able = [
         f
         for f in first.rivals
-        if f.candidates[-1].id not in out and not is_at_an_end(f) and start - left[f.label] > TUNING.rival_share * most
+        if f.candidates[-1].id not in out and not ends_at_bound(f) and start - left[f.label] > TUNING.rival_share * most
     ]
     if not able:
         return found.refused()
     one = replace(first, fitted=min(able, key=lambda f: left[f.label])).again(problem)
-    one, after = as_conditioned(problem, one, mismatch_of(problem.dataset, one.fitted.blocks, phases), phases)
+    one, after = with_conditions_refitted(problem, one, mismatch_of(problem.dataset, one.fitted.blocks, phases), phases)
     return replace(found, parts=(one,), fitted=one.fitted, after=after, first=one)
 
 

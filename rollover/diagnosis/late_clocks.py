@@ -19,7 +19,7 @@ TUNING = SETTINGS.report.late_clocks
 ID = "sensor-clock-offset"
 
 
-def beside_clocks(found: Diagnosis, late: Mapping[str, float], problem: Problem, tried: Explanation) -> Diagnosis:
+def with_clock_finding(found: Diagnosis, late: Mapping[str, float], problem: Problem, tried: Explanation) -> Diagnosis:
     """A diagnosis made with clocks set right that were `late` (s, by recording), with that as its first finding."""
     groups = [[r] for r in range(len(problem.dataset))]
     before, held = judged(problem, tried.base, [], groups), held_out(tried.base, groups).total

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal, dataset_of
-from rollover.diagnosis.data.onset import from_first_contact
+from rollover.diagnosis.data.onset import zeros_from_contact
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.time_shift import align
-from rollover.diagnosis.forward.averaging import on_one_branch, referred, simulated
+from rollover.diagnosis.forward.averaging import on_attitude_branch, simulated, with_reference_attitude
 from rollover.diagnosis.forward.forward_model import Simulator, simulator_of
 from rollover.diagnosis.forward.full_run import CENTRE, full_runs, made_ahead
 from rollover.diagnosis.io import diagnosed_scenario
-from rollover.diagnosis.noise.ensemble import averaged
+from rollover.diagnosis.noise.ensemble import running_mean
 from rollover.diagnosis.noise.heteroscedasticity import with_variance_model
 from rollover.diagnosis.result import Diagnosis
 from rollover.diagnosis.settings import SETTINGS
@@ -98,7 +98,7 @@ def series(
     diagnosed = diagnosed_scenario(scenario, found)
     judged = found.held_out if set(found.held_out) != set(found.training) else ()
     told = []
-    for name, recording in from_first_contact(scenario, recordings)[0]:
+    for name, recording in zeros_from_contact(scenario, recordings)[0]:
         laid = {CENTRE: found.grids[name]} if name in found.grids else {}
         other = diagnosed.replaced(laid) if found.effects or found.empirical else None
         one = _told(name, recording, scenario.replaced(laid), other, name in judged, children)
@@ -115,7 +115,7 @@ def _told(
     held_out: bool,
     children: Children | None,
 ) -> Told | None:
-    recording, reference = on_one_branch(scenario, recording)
+    recording, reference = on_attitude_branch(scenario, recording)
     made = [_simulators(one, recording, reference) for one in (scenario, diagnosed) if one is not None]
     full = [runs for _, *both, _ in made for one in both if (runs := full_runs(one)) is not None]
     for runs in full:
@@ -138,7 +138,7 @@ def _told(
         there = np.isfinite(recording.channels[channel])
         stamps, measured = recording.time[there], recording.channels[channel][there]
         met = before[channel][there] if after is None else after[channel][there]
-        times = single(measured - met, signal.sigma, dataset.averaged) / signal.sigma
+        times = single_sample_noise(measured - met, signal.sigma, dataset.averaged) / signal.sigma
         both = (_scatter([d[channel][there] for d in perturbed], stamps), _louder(signal, thinner.time, stamps, times))
         more = [s for s in both if s is not None]
         tracks.append(
@@ -168,13 +168,18 @@ def _simulators(
 ) -> tuple[Recording, Simulator, Simulator, int]:
     """A recording at no more rows than are needed, what simulates it, what all stamps, and how many are in a row."""
     thin, simulator, many = simulated(scenario, recording, reference)
-    return thin, simulator, simulator if many == 1 else referred(simulator_of(scenario, recording), reference), many
+    return (
+        thin,
+        simulator,
+        simulator if many == 1 else with_reference_attitude(simulator_of(scenario, recording), reference),
+        many,
+    )
 
 
 def _scatter(perturbed: Sequence[Array], time: Array) -> Array | None:
     """1 sigma (n,) of what neighbouring runs differ by; None where there are none."""
     whole = [d for d in perturbed if np.all(np.isfinite(d))]
-    return np.sqrt(averaged(np.mean(np.square(whole), axis=0), time)) if whole else None
+    return np.sqrt(running_mean(np.mean(np.square(whole), axis=0), time)) if whole else None
 
 
 def _louder(signal: Signal, time: Array, stamps: Array, times: float) -> Array | None:
@@ -184,7 +189,7 @@ def _louder(signal: Signal, time: Array, stamps: Array, times: float) -> Array |
     return np.interp(stamps, time[signal.rows], signal.noise * times * np.sqrt(signal.level**2 - 1.0))
 
 
-def single(residual: Array, sigma: float, many: int) -> float:
+def single_sample_noise(residual: Array, sigma: float, many: int) -> float:
     """Noise (1 sigma) of single samples, of which means of `many` have `sigma`, by their misfit (n,).
 
     Variance of the means and that within them: of coloured noise, as behind a filter, it is no `many` times the means'.

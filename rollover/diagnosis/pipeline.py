@@ -11,18 +11,18 @@ import numpy as np
 from rollover.diagnosis.alone import follows_a_law
 from rollover.diagnosis.conclusion import Asked, Conclusion, concluded
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.data.inconsistent import Aside, inconsistencies_of, without
-from rollover.diagnosis.data.onset import about_clocks, at_their_zeros
-from rollover.diagnosis.data.rounding import to_the_last_digit
+from rollover.diagnosis.data.inconsistent import Aside, find_inconsistencies, without_inconsistent
+from rollover.diagnosis.data.onset import clock_notes, with_clock_zeros
+from rollover.diagnosis.data.rounding import with_rounding_uncertainty
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.time_shift import align, is_all_by_clocks, mistimed
+from rollover.diagnosis.fit.time_shift import align, clock_outliers, is_explained_by_clocks
 from rollover.diagnosis.forward.forward_model import set_up
-from rollover.diagnosis.inference.discrepancy import Discrepancy, beside, estimated, taught
+from rollover.diagnosis.inference.discrepancy import Discrepancy, estimated, learned_from_references, with_discrepancy
 from rollover.diagnosis.inference.wrong_condition import wrong_conditions
 from rollover.diagnosis.invariants import checked
-from rollover.diagnosis.late_clocks import beside_clocks
-from rollover.diagnosis.prepared import prepared, trusted
+from rollover.diagnosis.late_clocks import with_clock_finding
+from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis
 from rollover.diagnosis.selection.decision import Explanation
@@ -70,11 +70,11 @@ def diagnose(
         if channel not in channels:
             raise ValueError(f"tolerance: no such channel recorded, got {channel!r}; {', '.join(channels)}")
     executor = executor or Executor()
-    recordings, zeros = at_their_zeros(scenario, [(name, continuous(r)) for name, r in recordings])
+    recordings, zeros = with_clock_zeros(scenario, [(name, continuous(r)) for name, r in recordings])
     is_drop = isinstance(scenario.vehicle, Striker)  # what little errors do to an overturn is chance, see `chaos`
-    recordings, rounded = to_the_last_digit(recordings) if is_drop else (recordings, [])
+    recordings, rounded = with_rounding_uncertainty(recordings) if is_drop else (recordings, [])
     every, notes = prepared(scenario, recordings, executor)
-    notes += [*about_clocks(scenario, recordings, zeros), *rounded]
+    notes += [*clock_notes(scenario, recordings, zeros), *rounded]
     every = [replace(e, model_error=float(np.hypot(e.model_error, general))) for e in every]
     asked = Asked(
         scenario=scenario,
@@ -86,19 +86,19 @@ def diagnose(
         estimates=estimate,
     )
     if reference:
-        every, learned = _by_references(scenario, every, reference)
+        every, learned = _learned_from_references(scenario, every, reference)
         asked = replace(asked, discrepancy=learned)
     if stated:
         asked = replace(asked, discrepancy=Discrepancy(scales=stated))
     if asked.discrepancy is not None:
-        every = beside(every, asked.discrepancy)
-    some, shared = inconsistencies_of(every)
-    wrong = wrong_conditions([e for e in without(every, some) if e.name not in hold_out])
+        every = with_discrepancy(every, asked.discrepancy)
+    some, shared = find_inconsistencies(every)
+    wrong = wrong_conditions([e for e in without_inconsistent(every, some) if e.name not in hold_out])
     every = [e for e in every if e.name not in {one.dataset.name for one in wrong}]
-    found = _diagnosed(asked, without(every, some), [*some, *wrong], notes)
+    found = _diagnosed(asked, without_inconsistent(every, some), [*some, *wrong], notes)
     if found.verdict == "unexplained" and shared:
         # beside a factor so large what else is missing may be out of sight
-        other = _diagnosed(asked, without(every, [*some, *shared]), [*some, *shared, *wrong], notes)
+        other = _diagnosed(asked, without_inconsistent(every, [*some, *shared]), [*some, *shared, *wrong], notes)
         found = other if other.effects else found
     return checked(replace(found, clocks=zeros, seconds=clock.perf_counter() - began))
 
@@ -115,13 +115,15 @@ def _diagnosed(
         return found
     # what is named and leaves structure is held against no more than noise as well
     if asked.estimates and found.shown is None and (found.verdict == "unexplained" or found.grade == "part"):
-        other = _set_right(found, every, notes) or _beside(found, every, notes)
+        other = _with_clocks_corrected(found, every, notes) or _beside_estimated_discrepancy(found, every, notes)
         if other is not None:
             return other
     return reported(found)
 
 
-def _beside(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]) -> Diagnosis | None:
+def _beside_estimated_discrepancy(
+    found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]
+) -> Diagnosis | None:
     """The diagnosis beside a discrepancy as large as what explanations leave says; None if it says no more."""
     asked, tried = found.asked, found.tried
     if asked.discrepancy is not None or found.acts != "drop":
@@ -129,13 +131,17 @@ def _beside(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]) -
     several = [tried.fitted] if len(tried.fitted.candidates) > 1 else []
     learned = estimated(found.problem, tried.base, [*_rivals(tried), *several])
     asked.say("a model is never exact: again beside a discrepancy of the size that explanations leave")
-    other = concluded(replace(asked, discrepancy=learned), beside(every, learned), found.inconsistencies, notes)
+    other = concluded(
+        replace(asked, discrepancy=learned), with_discrepancy(every, learned), found.inconsistencies, notes
+    )
     if isinstance(other, Conclusion) and other.tried.first is not None:
         # fits held against noise alone are bent to what they cannot meet, and leave more than others would
         again = estimated(other.problem, other.tried.base, _rivals(other.tried))
         if learned.is_clearly_above(again):
             learned = again
-            other = concluded(replace(asked, discrepancy=learned), beside(every, learned), found.inconsistencies, notes)
+            other = concluded(
+                replace(asked, discrepancy=learned), with_discrepancy(every, learned), found.inconsistencies, notes
+            )
     if isinstance(other, Diagnosis):
         return None
     is_told = bool(other.effects) or (other.verdict == "no-mismatch" and learned.is_usual and not _is_lawful(other))
@@ -156,25 +162,25 @@ def _rivals(tried: Explanation) -> tuple[Fitted, ...]:
     return tried.first.rivals if tried.first is not None else ()
 
 
-def _by_references(
+def _learned_from_references(
     scenario: Scenario, every: Sequence[Dataset], reference: Sequence[str]
 ) -> tuple[list[Dataset], Discrepancy | None]:
     """The recordings that are no references, and what these teach of the discrepancy; None if noise hides it."""
     usable = [e for e in every if e.name in reference]
     learned = None
     if usable:
-        problem = Problem(trusted(scenario, usable))
+        problem = Problem(weighted_datasets(scenario, usable))
         align(problem)
         base = problem.fit((), ())
-        learned = None if base is None else taught(problem, base)
+        learned = None if base is None else learned_from_references(problem, base)
     return [e for e in every if e.name not in reference], learned
 
 
-def _set_right(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]) -> Diagnosis | None:
+def _with_clocks_corrected(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]) -> Diagnosis | None:
     """The diagnosis with clocks set right that are off by far more than they may be; None if that explains nothing."""
     asked, problem, base = found.asked, found.problem, found.tried.base
-    late = {} if asked.is_timed else dict(mistimed(problem, base, asked.executor.parallel_map))
-    if not late or not is_all_by_clocks(problem, base, asked.executor.parallel_map):
+    late = {} if asked.is_timed else dict(clock_outliers(problem, base, asked.executor.parallel_map))
+    if not late or not is_explained_by_clocks(problem, base, asked.executor.parallel_map):
         return None
     own = {e.name: e for e in every}
     moved = {n: replace(r, time=r.time - late.get(n, 0.0)) for n, r in asked.recordings.items() if n in own}
@@ -187,4 +193,4 @@ def _set_right(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]
     other = _diagnosed(replace(asked, recordings=moved, is_timed=True), again, found.inconsistencies, notes)
     if other.verdict in ("unexplained", "cannot-tell"):
         return None
-    return beside_clocks(other, late, problem, found.tried)
+    return with_clock_finding(other, late, problem, found.tried)

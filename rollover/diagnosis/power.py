@@ -34,7 +34,7 @@ def is_weak(detectable: Mapping[str, float]) -> bool:
     return blind > TUNING.blind_share * len(typical) if acts else blind == len(typical)
 
 
-def nothing_told(
+def cannot_tell(
     dataset: Sequence[Dataset], names: Sequence[str], notes: Sequence[str], began: float, why: str = ""
 ) -> Diagnosis:
     """The answer where there is too little to judge."""

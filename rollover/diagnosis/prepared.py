@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rollover.diagnosis.data.dataset import Dataset, dataset_of, doubted, foreign_to
-from rollover.diagnosis.data.quantisation import digitised, without_spikes
+from rollover.diagnosis.data.dataset import Dataset, dataset_of, no_common_channel, with_uncertain_conditions
+from rollover.diagnosis.data.quantisation import with_quantisation, without_spikes
 from rollover.diagnosis.data.repeatability import with_scatter
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
@@ -16,7 +16,7 @@ from rollover.diagnosis.forward.averaging import compared
 from rollover.diagnosis.forward.forward_model import first_impact_of, set_up
 from rollover.diagnosis.forward.full_run import full_runs
 from rollover.diagnosis.noise import autoregression
-from rollover.diagnosis.noise.ensemble import weighted
+from rollover.diagnosis.noise.ensemble import with_sample_weights
 from rollover.diagnosis.noise.heteroscedasticity import with_variance_model
 from rollover.diagnosis.noise.offsets import with_zeros
 from rollover.diagnosis.noise.truncation import shortened
@@ -47,13 +47,13 @@ def prepared(
         notes += [f"{name}: {channel} is constant and was excluded" for channel in still]
         if one is None:
             notes.append(f"{name}: shares no usable channel with the simulation and was excluded")
-            foreign += foreign_to(simulator, name, recording)
+            foreign += no_common_channel(simulator, name, recording)
         else:
             found.append(one)
             read.append(recording)
     if foreign and not found:
         raise InputError(*foreign)
-    found = with_variance_model(digitised(found, read))
+    found = with_variance_model(with_quantisation(found, read))
     louder = {s.channel: float(s.level.max()) for e in found for s in e.signals if s.level is not None}
     notes += [f"{c}: the noise grows with the value, to {most:.1f} times its least" for c, most in louder.items()]
     steps = {s.channel: s.step for e in found for s in e.signals if s.step > 0.0}
@@ -66,17 +66,17 @@ def prepared(
 
 def with_common_noise(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:
     """The recordings with the noise of those alike taken together, from their quiet stretches."""
-    every = [doubted(e, set_up(scenario, e.recording)) for e in with_scatter(every)]
+    every = [with_uncertain_conditions(e, set_up(scenario, e.recording)) for e in with_scatter(every)]
     problem = Problem(every)
     align(problem)
     base = problem.fit((), (), rounds=2)
     if base is None:
         return list(every)
     residuals, shifts = problem.residuals(base), [b.shift for b in base.blocks]
-    return with_zeros(autoregression.quiet(every, residuals), residuals, shifts)
+    return with_zeros(autoregression.with_noise_of_quiet_stretches(every, residuals), residuals, shifts)
 
 
-def trusted(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:
+def weighted_datasets(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:
     """The recordings weighed, what the simulation itself is not sure of less."""
-    reweighted = [weighted(e, e.simulator.perturbed()) for e in with_common_noise(scenario, every)]
+    reweighted = [with_sample_weights(e, e.simulator.perturbed()) for e in with_common_noise(scenario, every)]
     return [shortened(e, alone=len(reweighted) == 1) for e in reweighted]

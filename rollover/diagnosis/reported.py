@@ -8,33 +8,33 @@ from dataclasses import replace
 
 from rollover.diagnosis.conclusion import Conclusion
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.data.inconsistent import by_inconsistencies
-from rollover.diagnosis.data.repeatability import against_itself, differing
+from rollover.diagnosis.data.inconsistent import inconsistency_evidence
+from rollover.diagnosis.data.repeatability import contradiction_clause, inconsistent_repeats
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.time_shift import by_clock, mistimed
+from rollover.diagnosis.fit.time_shift import clock_evidence, clock_outliers
 from rollover.diagnosis.forward.full_run import full_runs
 from rollover.diagnosis.grades import answer_of, share_of
 from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
-from rollover.diagnosis.inference.chassis import degrees_of
+from rollover.diagnosis.inference.chassis import misfit_by_degree_of_freedom
 from rollover.diagnosis.inference.drop_dependence import Dependence, dependence, dependence_of_one
 from rollover.diagnosis.inference.residual_law import offered, proposed
-from rollover.diagnosis.inference.scores import before_an_impact, judged
+from rollover.diagnosis.inference.scores import judged, misfit_before_impact
 from rollover.diagnosis.inference.vehicle_dependence import dependency
 from rollover.diagnosis.planning.by_fits import next_test
 from rollover.diagnosis.power import is_weak
 from rollover.diagnosis.result import Degree, Diagnosis, Named, Share
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
-    as_models_miss,
     by_share,
-    by_steps,
-    closest,
-    considered,
+    candidate_table,
+    closest_candidate_sentence,
+    immaterial_sentence,
+    no_contact_clause,
     noise,
-    of_no_consequence,
-    of_no_ground,
     places,
     sentence,
+    step_error_note,
+    usual_model_error_sentence,
 )
 from rollover.effects import spoken
 
@@ -58,7 +58,7 @@ def reported(c: Conclusion) -> Diagnosis:
     if c.acts == "drop" and is_mismatch:
         depends_on = dependence(problem, set_ups, explanation.base, executor.parallel_map)
     elif c.acts == "rollover":
-        degrees = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
+        degrees = misfit_by_degree_of_freedom(set_ups, found, [b.shift for b in explanation.base.blocks])
         of_one = dependence_of_one(problem, explanation.base, before) if is_mismatch else None
         of_motion = Dependence(shares=dependency(problem, explanation.base))
         depends_on = of_motion if of_one is None or of_one.yields_to(of_motion) else of_one
@@ -68,11 +68,14 @@ def reported(c: Conclusion) -> Diagnosis:
         law = proposed(problem, explanation.base, set_ups, found, groups)
     told_of = {} if asked.discrepancy is None else asked.discrepancy.told(found)
     detectable = dict(explanation.detectable)
-    contrary = differing(found, SETTINGS.data.repeatability.contradiction)
+    contrary = inconsistent_repeats(found, SETTINGS.data.repeatability.contradiction)
     if verdict == "no-mismatch" and not c.slight and (contrary or is_weak(detectable)):
         verdict = "cannot-tell"
     h_before, h_after = (judged(problem, f, c.kept, groups) for f in (explanation.base, explanation.fitted))
-    early = before_an_impact(problem.dataset, explanation.base), before_an_impact(problem.dataset, explanation.fitted)
+    early = (
+        misfit_before_impact(problem.dataset, explanation.base),
+        misfit_before_impact(problem.dataset, explanation.fitted),
+    )
     remains = not (c.is_beside and is_tolerated(problem, explanation.fitted)) and not is_enough(
         problem, explanation.fitted, after
     )
@@ -80,15 +83,20 @@ def reported(c: Conclusion) -> Diagnosis:
     lost = by_itself if verdict == "unexplained" else ()
     is_left = (verdict == "unexplained" and shown is None) or (bool(effects) and remains)
     training = tuple(e.name for e in found)
-    notes = [*c.notes, *(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *by_steps(effects), *_cost(found)]
+    notes = [
+        *c.notes,
+        *(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch),
+        *step_error_note(effects),
+        *_cost(found),
+    ]
     return Diagnosis(
         verdict=verdict,
         sentence=(
             shown.sentence
             if shown is not None
-            else of_no_consequence(c.slight)
+            else immaterial_sentence(c.slight)
             if c.slight
-            else as_models_miss(asked.discrepancy.by_none, explanation.p_value, len(found), _most(c))
+            else usual_model_error_sentence(asked.discrepancy.by_none, explanation.p_value, len(found), _most(c))
             if verdict == "no-mismatch" and asked.discrepancy is not None and c.is_beside
             else sentence(
                 verdict,
@@ -103,13 +111,13 @@ def reported(c: Conclusion) -> Diagnosis:
                 beside=c.is_beside and bool(told_of),
             )
         )
-        + (closest(explanation, groups) if verdict == "unexplained" and shown is None else "")
-        + (by_clock(mistimed(problem, explanation.fitted, executor.parallel_map)) if is_left else "")
+        + (closest_candidate_sentence(explanation, groups) if verdict == "unexplained" and shown is None else "")
+        + (clock_evidence(clock_outliers(problem, explanation.fitted, executor.parallel_map)) if is_left else "")
         + (by_share(effects, told_of) if shown is None else "")
         + offered(law)
-        + by_inconsistencies(c.inconsistencies)
-        + against_itself(verdict, contrary)
-        + of_no_ground(found),
+        + inconsistency_evidence(c.inconsistencies)
+        + contradiction_clause(verdict, contrary)
+        + no_contact_clause(found),
         p_value=explanation.p_value if shown is None else shown.p_value,
         noise=noise(found),
         where=places(before, found, depends_on.on) if is_mismatch else by_itself,
@@ -128,7 +136,7 @@ def reported(c: Conclusion) -> Diagnosis:
         per_recording=tuple(
             (n, a, b) for (n, a), (_, b) in zip(h_before.by_recording, h_after.by_recording, strict=True)
         ),
-        candidates=considered(explanation, c.candidates, groups),
+        candidates=candidate_table(explanation, c.candidates, groups),
         simulations=problem.simulations,
         seconds=clock.perf_counter() - asked.began,
         notes=tuple(notes),

@@ -33,7 +33,7 @@ def check(scenario: Scenario, measured: Mapping[str, Recording]) -> None:
         raise InputError(*faults)
 
 
-def prechecked(scenario: Scenario, measured: Mapping[str, Recording]) -> list[tuple[str, Finding]]:
+def sensor_precheck(scenario: Scenario, measured: Mapping[str, Recording]) -> list[tuple[str, Finding]]:
     """Name of the recording and finding, for what the recordings alone give away about their sensors."""
     found = []
     for name, recording in measured.items():

@@ -9,7 +9,7 @@ import numpy as np
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Held, held_out
-from rollover.diagnosis.fit.ensemble_mean import in_shorter_steps
+from rollover.diagnosis.fit.ensemble_mean import refined_by_ensemble_mean
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Groups, Step
@@ -34,7 +34,7 @@ def named(
     of what was recorded.
     """
     fitted, held = found.fitted, problem.dataset
-    fine = in_shorter_steps(problem, fitted)
+    fine = refined_by_ensemble_mean(problem, fitted)
     told = intervals(problem, fine, coarse=fitted)
     if fine is not fitted:
         problem.with_noise_model(held)
@@ -58,7 +58,7 @@ def named(
             Named(
                 id=c.id,
                 kind=c.kind,
-                statement=" ".join([effect.says(), *same.values(), *_or_the_other(problem, c, values)]),
+                statement=" ".join([effect.says(), *same.values(), *_clock_ambiguity(problem, c, values)]),
                 parameters=parameters,
                 settings=values,
                 channel=c.channel,
@@ -71,7 +71,7 @@ def named(
     return tuple(sorted(effects, key=lambda n: (n.id, n.channel) != (first.id, first.channel)))
 
 
-def _or_the_other(problem: Problem, c: Candidate, values: Mapping[str, Any]) -> list[str]:
+def _clock_ambiguity(problem: Problem, c: Candidate, values: Mapping[str, Any]) -> list[str]:
     """What is to be said of a channel that comes late by no more than the clocks are unsure of, beside one other."""
     others = {s.channel for e in problem.dataset for s in e.signals} - {c.channel}
     if c.id != "sensor-clock-offset" or len(others) != 1:
@@ -82,7 +82,7 @@ def _or_the_other(problem: Problem, c: Candidate, values: Mapping[str, Any]) -> 
     return [f"With two channels the late one cannot be identified: {others.pop()} may be {way} by as much."]
 
 
-def is_none(effect: Named) -> bool:
+def is_null_effect(effect: Named) -> bool:
     """Whether all that an effect is may be none of it: the interval of each number that has a null holds that.
 
     A range of logarithms holds no nought: there an interval that goes down to a small part of the value does.
@@ -108,10 +108,10 @@ def interval_contains_null(effects: Sequence[Named], scattering: bool) -> set[st
     """
     if len(effects) == 1 and (not scattering or EFFECTS[effects[0].id].is_sudden):
         return set()
-    return {e.id for e in effects if is_none(e)}
+    return {e.id for e in effects if is_null_effect(e)}
 
 
-def of_no_ground(found: Sequence[Dataset]) -> str:
+def no_contact_clause(found: Sequence[Dataset]) -> str:
     """What a sentence goes on with where no recording reaches the first contact that is simulated."""
     contacts = [e.simulator.contact for e in found]
     ends = [max(float(e.recording.time[s.rows[-1]]) for s in e.signals) for e in found]
@@ -120,7 +120,7 @@ def of_no_ground(found: Sequence[Dataset]) -> str:
     return " None of them reaches the first contact: nothing can be said of the ground."
 
 
-def of_no_consequence(effects: Sequence[Named]) -> str:
+def immaterial_sentence(effects: Sequence[Named]) -> str:
     """The sentence where all that separates simulation and recordings moves no load by more than a share of it."""
     moves = max(e.moves or 0.0 for e in effects)
     said = " ".join(e.statement for e in effects)
@@ -142,7 +142,7 @@ def by_share(effects: Sequence[Named], scales: Mapping[str, Scale]) -> str:
     return said
 
 
-def as_models_miss(
+def usual_model_error_sentence(
     left: Mapping[str, float], p_value: float, recordings: int, best: tuple[Candidate, Share] | None = None
 ) -> str:
     """The sentence where what a scenario leaves, a share of each channel's range, is what models usually miss.
@@ -164,7 +164,7 @@ def as_models_miss(
     )
 
 
-def by_steps(effects: Sequence[Named]) -> list[str]:
+def step_error_note(effects: Sequence[Named]) -> list[str]:
     """What the scenario's own steps would have said of values, where that is far off beside their intervals."""
     return [
         f"{effect.id} {name}: {i.value:.4g} {i.unit}".rstrip()
@@ -175,7 +175,7 @@ def by_steps(effects: Sequence[Named]) -> list[str]:
     ]
 
 
-def considered(
+def candidate_table(
     found: Explanation, candidates: Sequence[Candidate], groups: Sequence[Sequence[int]]
 ) -> tuple[Considered, ...]:
     """Every candidate with its gain on held-out conditions beside the base, and why it was not chosen."""
@@ -210,7 +210,7 @@ def considered(
     return tuple(sorted(lines.values(), key=lambda c: -c.held_out_gain))
 
 
-def closest(found: Explanation, groups: Sequence[Sequence[int]]) -> str:
+def closest_candidate_sentence(found: Explanation, groups: Sequence[Sequence[int]]) -> str:
     """Which candidate comes closest to explaining what none explains, if one takes at least half; else nothing."""
     one = found.first
     if one is None:

@@ -15,7 +15,7 @@ from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.forward.averaging import Averaged
 from rollover.diagnosis.forward.full_run import RunSimulator
-from rollover.diagnosis.noise.truncation import left_aside, shortened, soon, up_to
+from rollover.diagnosis.noise.truncation import shortened, shortly_after_impact, truncation_notes, up_to
 from rollover.diagnosis.selection import forward_step, scan
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
@@ -75,7 +75,7 @@ def test_an_end_that_hardly_counts_isleft_aside() -> None:
     np.testing.assert_array_equal(found.perturbed[0], np.arange(n))
     assert isinstance(found.simulator, RunSimulator)
     assert found.simulator.scenario.simulation.duration < IMPACT + SETTINGS.noise.truncation.kept_after_impact + 0.05
-    assert left_aside([whole], [found]) == ["toss: what comes after 1.10 s is chaotic and was excluded"]
+    assert truncation_notes([whole], [found]) == ["toss: what comes after 1.10 s is chaotic and was excluded"]
 
 
 def test_an_end_that_counts_is_kept() -> None:
@@ -151,10 +151,10 @@ def a_step_at(moment: float) -> Dataset:
 )
 def test_screening_sees_shortly_after_both_first_impacts(moved: float, first_impact: float, end: float) -> None:
     whole = replace(a_step_at(moved), first_impact=first_impact)
-    found = soon(whole)
+    found = shortly_after_impact(whole)
     assert found.recording.time[-1] == pytest.approx(min(end, END - STEP), abs=STEP)  # stamps are a step apart
     assert (found is whole) == (end == END)  # 1.4 + LASTING is the end
-    assert soon(whole).simulator is found.simulator  # its runs are known
+    assert shortly_after_impact(whole).simulator is found.simulator  # its runs are known
 
 
 def test_truncated_data_keep_the_noise_model_of_the_whole() -> None:

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.noise import autoregression
-from rollover.diagnosis.noise.drift import along, cosines, is_louder, is_recorders, is_shared, is_slow
+from rollover.diagnosis.noise.drift import cosines, is_louder, is_recorder_noise, is_shared, is_slow, leading_cosines
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
 
@@ -43,7 +43,7 @@ def told(misfits: Sequence[np.ndarray], sigma: float = 1.0) -> Told:
 
 def share(make: Callable[[np.random.Generator], Told]) -> float:
     """How often what is made is taken for a recorder's noise, of 100."""
-    return sum(is_recorders(make(np.random.default_rng(seed))) for seed in range(100)) / 100.0
+    return sum(is_recorder_noise(make(np.random.default_rng(seed))) for seed in range(100)) / 100.0
 
 
 def test_cosines_are_orthonormal_and_expected_of_noise() -> None:
@@ -53,7 +53,7 @@ def test_cosines_are_orthonormal_and_expected_of_noise() -> None:
     for _ in range(400):
         w = lfilter([0.8], [1.0, -0.6], rng.standard_normal(N + 50))[50:]
         one = signal(w, 1.0, (0.6,))
-        found.append([float(np.mean(along(one, part, k) ** 2)) for part, k in ((w[:60], 5), (w[60:], 8))])
+        found.append([float(np.mean(leading_cosines(one, part, k) ** 2)) for part, k in ((w[:60], 5), (w[60:], 8))])
     np.testing.assert_allclose(np.mean(found, axis=0), 1.0, atol=0.05)
 
 
@@ -61,7 +61,7 @@ def test_a_channel_silent_at_rest_has_no_recorder_noise() -> None:
     """Over no noise everything is slow, and as loud before as after: no number to go by."""
     rng = np.random.default_rng(1)
     with np.errstate(divide="raise", invalid="raise"):
-        assert not is_recorders(told([pink(rng) for _ in range(6)], 0.0))
+        assert not is_recorder_noise(told([pink(rng) for _ in range(6)], 0.0))
 
 
 def test_noise_of_one_over_f_is_its_recorder_s() -> None:
@@ -88,12 +88,14 @@ def test_what_is_louder_after_the_contact_or_shared_is_missing() -> None:
     assert share(lambda rng: of(rng, [4.0, -4.0, 5.0, -5.0, 6.0, -6.0])) <= 0.05
     both = [4.0, -4.0, 5.0, -5.0, 6.0, -6.0]
     quiet, loud, alike = (of(np.random.default_rng(1), sizes) for sizes in (6 * [0.0], both, 6 * [3.0]))
-    before = np.array([along(s, w[:BEFORE], 5) for _, s, w in quiet])
+    before = np.array([leading_cosines(s, w[:BEFORE], 5) for _, s, w in quiet])
     assert is_slow(before)
     for every, louder in ((quiet, False), (loud, True)):
-        after = [along(s, part, 5) for _, s, w in every for part in w[BEFORE : 6 * BEFORE].reshape(5, BEFORE)]
+        after = [leading_cosines(s, part, 5) for _, s, w in every for part in w[BEFORE : 6 * BEFORE].reshape(5, BEFORE)]
         assert is_louder(before, np.array(after)) is louder
-    shared = [is_shared(np.array([along(s, w[BEFORE:], 8) for _, s, w in every])) for every in (quiet, loud, alike)]
+    shared = [
+        is_shared(np.array([leading_cosines(s, w[BEFORE:], 8) for _, s, w in every])) for every in (quiet, loud, alike)
+    ]
     assert shared == [False, False, True]
 
 
@@ -114,12 +116,12 @@ def test_one_offset_is_shared_by_recordings_of_unlike_noise() -> None:
 def test_two_recordings_or_a_short_approach_show_no_drift() -> None:
     rng = np.random.default_rng(2)
     every = told([pink(rng) for _ in range(6)], 0.6)
-    assert is_recorders(every)
-    assert not is_recorders(every[:2])
+    assert is_recorder_noise(every)
+    assert not is_recorder_noise(every[:2])
     late: Any = SimpleNamespace(recording=SimpleNamespace(time=TIME + 0.045), simulator=SimpleNamespace(contact=0.0))
-    assert not is_recorders([(late, s, w) for _, s, w in every])
+    assert not is_recorder_noise([(late, s, w) for _, s, w in every])
     never: Any = SimpleNamespace(recording=SimpleNamespace(time=TIME), simulator=SimpleNamespace(contact=np.inf))
-    assert not is_recorders([(never, s, w) for _, s, w in every])
+    assert not is_recorder_noise([(never, s, w) for _, s, w in every])
 
 
 def test_a_long_memory_reaches_where_a_short_one_does_not() -> None:
@@ -128,7 +130,9 @@ def test_a_long_memory_reaches_where_a_short_one_does_not() -> None:
     for _ in range(20):
         series = [pink(rng) + 0.5 * rng.standard_normal(N) for _ in range(6)]
         short, long = autoregression.autoregression(series), autoregression.long_memory(series)
-        levels.append((autoregression.level_of(*short), autoregression.level_of(*long), len(long[1])))
+        levels.append(
+            (autoregression.low_frequency_level(*short), autoregression.low_frequency_level(*long), len(long[1]))
+        )
     low, high, reach = np.mean(levels, axis=0)
     assert reach > 1.5 * SETTINGS.noise.autoregression.longest_memory
     assert high > 1.3 * low
@@ -136,7 +140,7 @@ def test_a_long_memory_reaches_where_a_short_one_does_not() -> None:
         series = [lfilter([1.0], [1.0, -a], rng.standard_normal(N)) for _ in range(6)]
         # its standard error by the memory's, sqrt((1 - a^2)/n)/(1 - a): 2, 4 and 9 %; within 2.5 of these
         error = np.sqrt((1.0 + a) / ((1.0 - a) * 6 * N))
-        assert autoregression.level_of(*autoregression.long_memory(series)) == pytest.approx(
+        assert autoregression.low_frequency_level(*autoregression.long_memory(series)) == pytest.approx(
             1.0 / (1.0 - a), rel=2.5 * error
         )
 

@@ -12,7 +12,7 @@ import pytest
 
 from rollover.comparison.synthesis import synthetic
 from rollover.diagnosis.data.dataset import Dataset, dataset_of
-from rollover.diagnosis.data.inconsistent import inconsistencies_of
+from rollover.diagnosis.data.inconsistent import find_inconsistencies
 from rollover.diagnosis.data.quantisation import without_spikes
 from rollover.diagnosis.forward.averaging import compared
 from rollover.dynamics import simulate
@@ -88,5 +88,5 @@ def test_an_opposite_sign_of_a_wrapped_roll_is_found() -> None:
     roll = replace(made, channels={ROLL: made[ROLL]}, noise={})
     away = within_half_a_turn(replace(roll, channels={ROLL: -made[ROLL]}))
     for recording, said in ((within_half_a_turn(roll), []), (away, [-1.0])):
-        some, shared = inconsistencies_of([dataset("multiple_roll", recording)[0]])
+        some, shared = find_inconsistencies([dataset("multiple_roll", recording)[0]])
         assert [s.factor for s in (*some, *shared)] == pytest.approx(said, abs=0.01)

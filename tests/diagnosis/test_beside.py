@@ -9,14 +9,14 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.alone import alike_beside, decided_beside
+from rollover.diagnosis.alone import alike_beside, verdict_on_single_effect
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.result import Share
 from rollover.diagnosis.selection.decision import Explanation
-from rollover.diagnosis.statements import as_models_miss
+from rollover.diagnosis.statements import usual_model_error_sentence
 from rollover.effects import EFFECTS, Search
 
 DROPS, SAMPLES = 6, 40
@@ -86,7 +86,9 @@ SOME = (0.8, 0.9, 1.0, 0.9, 1.0, 0.8)  # of which a discrepancy of unit size lea
 def test_an_effect_is_named_where_it_predicts_half_else_forgiven(
     base: tuple[float, ...], left: tuple[float, ...], p_value: float, verdict: str
 ) -> None:
-    found, said = decided_beside(PROBLEM, explanation(base, fitted("soil-layer", left), p_value=p_value), GROUPS)
+    found, said = verdict_on_single_effect(
+        PROBLEM, explanation(base, fitted("soil-layer", left), p_value=p_value), GROUPS
+    )
     assert said == verdict
     assert bool(found.parts) == (verdict == "missing-physics")
 
@@ -119,6 +121,6 @@ def test_rivals_akin_or_within_the_discrepancy_are_kept() -> None:
 def test_a_part_surely_predicted_is_told_though_forgiven(low: float, is_told: bool) -> None:
     candidate = fitted("sensor-bias", SOME).candidates[-1]
     best = (candidate, Share(share=0.35, low=low, high=0.58))
-    said = as_models_miss({"ground/sinkage": 0.021}, 1e-9, 6, best)
+    said = usual_model_error_sentence({"ground/sinkage": 0.021}, 1e-9, 6, best)
     assert "2.1% of ground/sinkage" in said
     assert ("predicted by sensor-bias: 35% (12% to 58%)" in said) is is_told

@@ -8,7 +8,7 @@ import pytest
 from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
-from rollover.diagnosis.noise.outliers import too_often, without_outliers
+from rollover.diagnosis.noise.outliers import outlier_p_value, without_outliers
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.test_chaos import SIGMA, STEP, N, dataset
 
@@ -35,20 +35,20 @@ def test_noise_is_that_beside_the_bursts() -> None:
     """They leave no window quiet: by windows it would be several times as large."""
     rng = np.random.default_rng(2)
     several = [dataset(loose(rng)) for _ in range(4)]
-    for e in autoregression.quiet(several, [e.signals[0].values for e in several]):
+    for e in autoregression.with_noise_of_quiet_stretches(several, [e.signals[0].values for e in several]):
         # 15 % of the samples are the middle of their neighbours, which is quieter: 6 % low, and 3 % of so few samples
         assert e.signals[0].noise == pytest.approx(SIGMA, rel=0.1)
-    for e in autoregression.whole(several, [loose(rng, ensemble_validated=1) for _ in several]):
+    for e in autoregression.with_noise_of_residuals(several, [loose(rng, ensemble_validated=1) for _ in several]):
         assert e.signals[0].noise == SIGMA  # as it was held
 
 
 def test_far_off_is_too_often_what_no_noise_has() -> None:
     rng = np.random.default_rng(3)
-    assert too_often([rng.standard_normal(500) for _ in range(9)]) > 0.9
-    assert too_often([rng.standard_t(4, 500) for _ in range(9)]) > 0.9
-    assert too_often([50.0 * rng.standard_normal(500)]) > 0.9  # all of it is off: that is for the others to say
-    assert too_often([rng.standard_normal(500), loose(rng, 500) / SIGMA]) < 1e-12
-    assert too_often([]) == 1.0
+    assert outlier_p_value([rng.standard_normal(500) for _ in range(9)]) > 0.9
+    assert outlier_p_value([rng.standard_t(4, 500) for _ in range(9)]) > 0.9
+    assert outlier_p_value([50.0 * rng.standard_normal(500)]) > 0.9  # all of it is off: that is for the others to say
+    assert outlier_p_value([rng.standard_normal(500), loose(rng, 500) / SIGMA]) < 1e-12
+    assert outlier_p_value([]) == 1.0
 
 
 def test_rare_bursts_are_a_mismatch_though_they_are_rough() -> None:

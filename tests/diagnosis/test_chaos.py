@@ -15,15 +15,15 @@ from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise.ensemble import (
     HeavyTail,
-    alike,
     gained,
     heavy_tail,
-    is_other,
+    leave_one_out_neighbours,
     memory,
+    neighbours_on_same_course,
+    p_value_of_other_courses,
     shares,
-    too_many,
-    unseen,
-    weighted,
+    took_other_course,
+    with_sample_weights,
 )
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
@@ -67,7 +67,7 @@ def test_a_sample_counts_by_its_noise_and_its_scatter() -> None:
     e = dataset(np.zeros(N))
     size = np.where(np.arange(N) < 100, 0.0, 0.5)
     alternating = {CHANNEL: size * (-1.0) ** np.arange(N)}  # each sample by itself: L = 1
-    found = weighted(e, [alternating, {CHANNEL: -alternating[CHANNEL]}]).signals[0].weight
+    found = with_sample_weights(e, [alternating, {CHANNEL: -alternating[CHANNEL]}]).signals[0].weight
     assert found is not None
     inside = slice(110, N)
     np.testing.assert_allclose(
@@ -88,7 +88,7 @@ def test_scatter_that_goes_together_counts_as_few_samples() -> None:
 def test_a_weight_is_applied_behind_the_whitening() -> None:
     e = dataset(np.zeros(N))
     perturbed = [{CHANNEL: np.full(N, 0.3)}]
-    w = weighted(e, perturbed)
+    w = with_sample_weights(e, perturbed)
     values = np.random.default_rng(0).standard_normal(N)
     weight = w.signals[0].weight
     assert weight is not None
@@ -105,7 +105,7 @@ def test_ensemble_scatter_is_no_mismatch_and_more_is_one() -> None:
     perturbed = [{CHANNEL: a * wave} for a in (0.6, -0.5, 0.4, -0.6)]
     off = 0.5 * wave + SIGMA * rng.standard_normal(N)
     plain = dataset(np.zeros(N))
-    sure = weighted(plain, perturbed)
+    sure = with_sample_weights(plain, perturbed)
     assert p_value(plain, off) < 1e-6
     assert p_value(sure, off) > 0.02
     early = np.where(t < 0.4, 0.3 * np.sin(2.0 * np.pi * 3.0 * t), 0.0)  # where no neighbour perturbed runs
@@ -130,7 +130,7 @@ def test_p_values_are_uniform_where_runs_scatter() -> None:
     for _ in range(120):
         several, blocks = [], []
         for _ in range(4):
-            e = weighted(dataset(np.zeros(N)), [{CHANNEL: strayed()} for _ in range(6)])
+            e = with_sample_weights(dataset(np.zeros(N)), [{CHANNEL: strayed()} for _ in range(6)])
             residual = e.whitened(strayed() + SIGMA * rng.standard_normal(N))
             blocks.append(
                 ResidualBlock(residual=residual, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1e-3)
@@ -144,8 +144,8 @@ def test_p_values_are_uniform_where_runs_scatter() -> None:
 
 def test_without_neighbours_all_is_as_it_was() -> None:
     e = dataset(np.zeros(N))
-    assert weighted(e, []) is e
-    assert weighted(e, [{CHANNEL: np.zeros(N)}]).signals[0].weight is None
+    assert with_sample_weights(e, []) is e
+    assert with_sample_weights(e, [{CHANNEL: np.zeros(N)}]).signals[0].weight is None
     time = np.arange(0.0, 0.1, 0.001)
     drop = Recording(title="r", time=time, channels={"ground/sinkage": np.zeros(time.size)})
     assert simulator_of(shipped("drop_test"), drop).perturbed() == []
@@ -199,7 +199,7 @@ def test_another_course_counts_as_one_state_of_unknown_size() -> None:
         expected + beyond
     )
     assert found.share == pytest.approx(share, rel=1e-12)
-    assert is_other(found)
+    assert took_other_course(found)
 
 
 def test_no_more_is_forgiven_than_there_is() -> None:
@@ -255,7 +255,7 @@ def test_a_course_like_the_neighbours_counts_in_full() -> None:
     e = blown()
     found = heavy_tail(e, misfit(e, [0.7] * 4))
     assert found is None
-    assert not is_other(found)
+    assert not took_other_course(found)
 
 
 def test_what_one_channel_leaves_alone_is_not_forgiven() -> None:
@@ -293,7 +293,7 @@ def test_p_values_are_uniform_where_another_course_is_forgiven() -> None:
     def p_value() -> float:
         several, blocks = [], []
         for _ in range(4):
-            e = weighted(plain, [strayed() for _ in range(6)])
+            e = with_sample_weights(plain, [strayed() for _ in range(6)])
             w = e.whitened(e.raw(strayed()) + SIGMA * rng.standard_normal(4 * N))
             counts = heavy_tail(e, w)
             w = w if counts is None else counts.samples * w
@@ -320,14 +320,14 @@ def test_a_neighbour_is_weighed_by_the_others() -> None:
     t, plain = STEP * np.arange(N), no_jacobian()
     late = np.where(t > IMPACT, np.sin(40.0 * t), 0.0)
     perturbed = [dict.fromkeys(CHANNELS, a * late) for a in (0.3, -0.5, 0.9)]
-    e = weighted(plain, perturbed)
-    found = unseen(e)
+    e = with_sample_weights(plain, perturbed)
+    found = leave_one_out_neighbours(e)
     for k, perturbed_run in enumerate(perturbed):
-        others = weighted(plain, [d for d in perturbed if d is not perturbed_run])
+        others = with_sample_weights(plain, [d for d in perturbed if d is not perturbed_run])
         np.testing.assert_array_equal(found[k], others.whitened(e.raw(perturbed_run)))
     largest = e.whitened(e.raw(perturbed[2]))
     assert np.sum(found[2] ** 2) > 1.5 * np.sum(largest**2)
-    assert unseen(plain).shape == (0, plain.count)
+    assert leave_one_out_neighbours(plain).shape == (0, plain.count)
 
 
 def test_a_neighbour_counts_as_a_recording_that_goes_like_it() -> None:
@@ -364,7 +364,9 @@ def of_courses(others: int) -> float:
 def test_one_recording_may_diverge_but_not_all_of_them() -> None:
     assert of_courses(0) > 0.05
     assert of_courses(1) > 0.05
-    assert of_courses(1) != pytest.approx(too_many(1, 4))  # so few tell nothing: a p-value of whole numbers is none
+    assert of_courses(1) != pytest.approx(
+        p_value_of_other_courses(1, 4)
+    )  # so few tell nothing: a p-value of whole numbers is none
     assert of_courses(4) < 1e-3
 
 
@@ -373,10 +375,10 @@ def test_a_neighbour_on_another_course_is_none() -> None:
     t = e.recording.time
     late = np.where(t > 0.6, np.sin(40.0 * t), 0.0)
     perturbed = [{CHANNEL: a * late} for a in (0.3, -0.2, 0.25, 4.0, -0.3)]
-    assert [d[CHANNEL].max() < 1.0 for d in alike(e, perturbed, 0.5)] == [True] * 4
+    assert [d[CHANNEL].max() < 1.0 for d in neighbours_on_same_course(e, perturbed, 0.5)] == [True] * 4
     early = [{CHANNEL: a * np.where(t < 0.4, 1.0, 0.0)} for a in (0.3, 4.0)]
-    assert len(alike(e, early, 0.5)) == 2  # before the impact there are no courses
+    assert len(neighbours_on_same_course(e, early, 0.5)) == 2  # before the impact there are no courses
     simulator: Any = Blown(0.5)
-    found = weighted(replace(e, simulator=simulator), perturbed)
+    found = with_sample_weights(replace(e, simulator=simulator), perturbed)
     assert found.first_impact == 0.5
     assert len(found.perturbed) == 4

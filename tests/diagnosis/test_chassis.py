@@ -7,7 +7,7 @@ import pytest
 
 from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.forward.full_run import RunSimulator
-from rollover.diagnosis.inference.chassis import degrees_of
+from rollover.diagnosis.inference.chassis import misfit_by_degree_of_freedom
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 from rollover.spec.vehicle import chassis_of
@@ -42,7 +42,7 @@ def thrown(speed: float, off: dict[str, str]) -> tuple[Scenario, Dataset]:
 
 def test_a_force_along_one_axis_is_found_with_its_size() -> None:
     tosses = [thrown(v, {ALONG[1]: "2.0 * np.sin(30.0 * t)"}) for v in (0.5, 1.0)]
-    degrees = degrees_of([s for s, _ in tosses], [e for _, e in tosses], [0.0, 0.0])
+    degrees = misfit_by_degree_of_freedom([s for s, _ in tosses], [e for _, e in tosses], [0.0, 0.0])
     first = degrees[0]
     assert (first.body, first.axis, first.unit) == ("chassis", "along y", "N")
     assert first.share > 0.95
@@ -54,7 +54,7 @@ def test_a_force_along_one_axis_is_found_with_its_size() -> None:
 
 def test_a_moment_is_inertia_times_angular_acceleration() -> None:
     own, e = thrown(0.7, {ABOUT[2]: "6.0 * t"})
-    degrees = degrees_of([own], [e], [0.0])
+    degrees = misfit_by_degree_of_freedom([own], [e], [0.0])
     assert degrees[0].axis == "about z"
     assert degrees[0].unit == "N m"
     inertia = chassis_of(own.vehicle).inertia[2]  # type: ignore[arg-type]
@@ -76,4 +76,4 @@ def test_instruments_elsewhere_are_no_forces_on_the_chassis() -> None:
         RunSimulator(own, no_jacobian),
     )
     assert there is not None
-    assert degrees_of([own], [there], [0.0]) == ()
+    assert misfit_by_degree_of_freedom([own], [there], [0.0]) == ()

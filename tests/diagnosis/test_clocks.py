@@ -11,7 +11,7 @@ from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.local_search import ended
 from rollover.diagnosis.fit.parameterisation import coordinate, followed
-from rollover.diagnosis.fit.time_shift import align, by_clock, by_first_contact, mistimed
+from rollover.diagnosis.fit.time_shift import align, clock_evidence, clock_outliers, shifts_from_contact
 from rollover.diagnosis.forward.forward_model import DropSimulator, simulator_of
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.score_test import score_test
@@ -67,7 +67,7 @@ def test_the_onset_is_not_biased_by_missing_physics(missing: dict[str, object]) 
     base = problem.fit((), ())
     assert base is not None
     bent = np.array([b.shift for b in base.blocks]) - truth
-    early = np.array([np.nan if v is None else v for v in by_first_contact(problem, (), ())]) - truth
+    early = np.array([np.nan if v is None else v for v in shifts_from_contact(problem, (), ())]) - truth
     assert np.abs(bent).max() > 0.6e-3  # a whole recording's shift eats part of it
     assert np.abs(early).max() < 0.25e-3
 
@@ -81,13 +81,13 @@ def test_the_onset_of_contact_is_found_whatever_happens_then(late: float) -> Non
     base = problem.fit((), ())
     assert base is not None
     bent = np.array([b.shift for b in base.blocks]) - late
-    early = np.array([np.nan if v is None else v for v in by_first_contact(problem, (), ())]) - late
+    early = np.array([np.nan if v is None else v for v in shifts_from_contact(problem, (), ())]) - late
     assert np.abs(bent).max() > 2e-3
     assert np.abs(early).max() < 1.3e-3  # the clocks themselves stray by half a millisecond
 
 
 def test_a_recording_that_begins_in_contact_has_no_onset() -> None:
-    assert by_first_contact(without_zero(judge_of({}), since=0.012), (), ()) == [None, None, None]
+    assert shifts_from_contact(without_zero(judge_of({}), since=0.012), (), ()) == [None, None, None]
 
 
 def test_a_large_offset_of_a_known_clock_is_not_believed() -> None:
@@ -96,10 +96,10 @@ def test_a_large_offset_of_a_known_clock_is_not_believed() -> None:
     for e in problem.dataset:
         clock = replace(e.recording.clock, zero="unknown")
         loose.append(replace(e, recording=replace(e.recording, clock=clock)))
-    told = [np.nan if v is None else v for v in by_first_contact(Problem(loose), (), ())]
+    told = [np.nan if v is None else v for v in shifts_from_contact(Problem(loose), (), ())]
     far = [abs(v) > SETTINGS.fit.time_shift.believed_width * e.shift_prior for v, e in zip(told, loose, strict=True)]
     assert any(far)
-    assert [v is None for v in by_first_contact(problem, (), ())] == far
+    assert [v is None for v in shifts_from_contact(problem, (), ())] == far
 
 
 def test_the_slope_of_a_clock_is_that_of_the_simulation() -> None:
@@ -193,10 +193,10 @@ def test_a_large_offset_is_estimated_by_alignment_of_the_run(late: float) -> Non
     problem = one_late(judge_of({}), late)
     base = problem.fit((), (), rounds=3)
     assert base is not None
-    [(name, found)] = mistimed(problem, base)
+    [(name, found)] = clock_outliers(problem, base)
     assert name == problem.dataset[1].name
     assert found == pytest.approx(late, abs=2e-3)  # what `recorded` makes it late by itself is up to 1.5 ms
-    said = by_clock([(name, found)])
+    said = clock_evidence([(name, found)])
     assert f"{spoken(abs(found) * 1e3)} ms {'late' if late > 0 else 'early'} ({name})" in said
 
 
@@ -205,8 +205,8 @@ def test_no_clock_is_blamed_for_what_the_simulation_misses(missing: dict[str, ob
     problem = judge_of(missing)
     base = problem.fit((), (), rounds=3)
     assert base is not None
-    assert mistimed(problem, base) == []
-    assert by_clock([]) == ""
+    assert clock_outliers(problem, base) == []
+    assert clock_evidence([]) == ""
 
 
 def cut_at(problem: Problem, until: float) -> Problem:
@@ -226,7 +226,7 @@ def test_any_contact_gives_a_time_shift_and_none_gives_none(until: float, told: 
     short = cut_at(one_late(judge_of({}), 0.15), until)
     base = short.fit((), (), rounds=3)
     assert base is not None
-    assert [round(s, 2) for _, s in mistimed(short, base)] == told
+    assert [round(s, 2) for _, s in clock_outliers(short, base)] == told
 
 
 @pytest.mark.parametrize("late", [0.4, -0.1, 7.0])
@@ -235,7 +235,7 @@ def test_a_time_shift_is_estimated_beside_missing_physics(late: float) -> None:
     problem = one_late(judge_of({"effects.soil-viscous-damping.damping": 250.0}), late)
     base = problem.fit((), (), rounds=3)
     assert base is not None
-    [(name, found)] = mistimed(problem, base)
+    [(name, found)] = clock_outliers(problem, base)
     assert name == problem.dataset[1].name
     assert found == pytest.approx(late, abs=0.016)  # no more than the damping bends it
 
@@ -253,11 +253,11 @@ def test_what_is_at_rest_tells_no_time() -> None:
         alone = Problem([one])
         base = alone.fit((), (), rounds=0)
         assert base is not None
-        assert mistimed(alone, base) == []
+        assert clock_outliers(alone, base) == []
 
 
 def test_milliseconds_that_are_many_are_spoken_in_full() -> None:
-    assert " 6,990 ms late (d)" in by_clock([("d", 6.99)])
+    assert " 6,990 ms late (d)" in clock_evidence([("d", 6.99)])
 
 
 def test_a_channel_far_too_early_is_screened_in_full_runs_too() -> None:
@@ -287,4 +287,4 @@ def test_a_record_that_ends_at_contact_has_no_onset() -> None:
     ]
     problem = Problem([e for e in ended if e is not None])
     assert len(problem.dataset) == 3
-    assert all(at is None or abs(at) < 0.03 for at in by_first_contact(problem, (), ()))
+    assert all(at is None or abs(at) < 0.03 for at in shifts_from_contact(problem, (), ()))

@@ -18,12 +18,19 @@ from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference import drop_dependence as dependence_of
 from rollover.diagnosis.inference.bases import ACCELERATION, DEPTH, SPEED, TIME
-from rollover.diagnosis.inference.drop_dependence import IMPACT, VALUE, Dependence, dependence, dependence_of_one, ways
+from rollover.diagnosis.inference.drop_dependence import (
+    IMPACT,
+    VALUE,
+    Dependence,
+    dependence,
+    dependence_of_one,
+    loading_paths,
+)
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
-from rollover.diagnosis.inference.residual_force import channels_of, pushed
+from rollover.diagnosis.inference.residual_force import channels_of, newmark_response
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.spectral_lines import lines, without
-from rollover.diagnosis.selection.flexibility import is_over_flexible, is_pliant
+from rollover.diagnosis.selection.flexibility import is_flexible_soil, is_over_flexible
 from rollover.effects import Search
 from rollover.proof.generator import Order, make
 from rollover.recording import Clock, Recording
@@ -43,7 +50,7 @@ def base_of(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple
     align(problem)
     first = problem.fit((), (), rounds=2)
     assert first is not None
-    problem.with_noise_model(autoregression.quiet(dataset, problem.residuals(first)))
+    problem.with_noise_model(autoregression.with_noise_of_quiet_stretches(dataset, problem.residuals(first)))
     base = problem.fit((), ())
     assert base is not None
     return problem, base
@@ -60,7 +67,7 @@ def test_a_spring_under_constant_force_swings_about_its_rest() -> None:
     p, u, t = np.array([3.0, -1.0]), 0.2, 5e-4 * np.arange(many)[:, None]
     z, v, a = (np.zeros((many, 2)) for _ in range(3))
     v[0] = u
-    pushed(np.tile(p, (many, 1)), np.full(many, w**2), h, z, v, a)
+    newmark_response(np.tile(p, (many, 1)), np.full(many, w**2), h, z, v, a)
     right = p / w**2 * (1.0 - np.cos(w * t)) + u / w * np.sin(w * t)
     assert np.max(np.abs(z - right)) < 1.5 * (w * h) ** 2 / 12.0 * (w * t[-1]) * np.max(np.abs(right))
     assert np.allclose(a, p - w**2 * z, rtol=0.0, atol=1e-9)
@@ -71,7 +78,7 @@ def test_a_force_does_to_every_channel_what_the_simulation_says() -> None:
     own, damping = scenario(), 400.0
     made = recorded({"effects.soil-viscous-damping.damping": damping}, channels=THREE, rate=2000.0, noise=1e-3)
     problem, base = base_of(own, made)
-    for d in ways(problem, [set_up(own, r) for _, r in made], base)[1]:
+    for d in loading_paths(problem, [set_up(own, r) for _, r in made], base)[1]:
         moved = channels_of(d.way, d.way.moved(damping * d.way.speed[:, None], "ground"), d.dataset, d.shift)[d.rows]
         s, w = d.slope[d.rows], d.residual[d.rows]
         left = w - moved[:, 0]
@@ -122,9 +129,9 @@ def test_loading_starts_at_onset_where_shifts_absorbed_it(
     scenarios = [set_up(scenario(), e.recording) for e in problem.dataset]
 
     def worst() -> float:
-        return max(d.score / d.rows.sum() for d in ways(problem, scenarios, base)[1])
+        return max(d.score / d.rows.sum() for d in loading_paths(problem, scenarios, base)[1])
 
-    assert all(abs(d.shift) < 1.5e-3 for d in ways(problem, scenarios, base)[1])
+    assert all(abs(d.shift) < 1.5e-3 for d in loading_paths(problem, scenarios, base)[1])
     assert worst() < 0.3  # of what noise leaves, beyond it
     monkeypatch.setattr(dependence_of, "by_first_contact", lambda *_: [None] * len(made))
     assert worst() > 3.0
@@ -202,10 +209,10 @@ def test_autocorrelated_noise_uses_all_residuals_drift_not() -> None:
     drift = white + 4.0 * np.tile(1.0 / (1.0 + np.exp(-(np.arange(n) - 200.0) / 15.0)), 3)
     for misfit, ar, kept in ((slow, (0.5,), False), (white, (), False), (drift, (), True)):
         before = held(misfit, 1.0, ar)
-        after = autoregression.whole(before, list(misfit.reshape(3, n)))
+        after = autoregression.with_noise_of_residuals(before, list(misfit.reshape(3, n)))
         assert (after[0].signals[0] is before[0].signals[0]) == kept
     assert sum(
-        autoregression.whole(held(slow, 1.0, (0.5,)), list(slow.reshape(3, n)))[0].signals[0].ar
+        autoregression.with_noise_of_residuals(held(slow, 1.0, (0.5,)), list(slow.reshape(3, n)))[0].signals[0].ar
     ) == pytest.approx(0.6, abs=0.08)
 
 
@@ -221,7 +228,7 @@ def test_offsets_are_no_autocorrelation_of_the_noise() -> None:
         # weighed once before, by what one effect had left
         again = [replace(e, signals=(replace(e.signals[0], noise=1.4, ar=(0.85,)),)) for e in before]
         for dataset in (before, again):
-            after = autoregression.whole(dataset, list(misfit.reshape(3, n)))
+            after = autoregression.with_noise_of_residuals(dataset, list(misfit.reshape(3, n)))
             assert (after[0].signals[0] is dataset[0].signals[0]) == kept
 
 
@@ -260,9 +267,9 @@ def test_three_effects_of_one_kind_are_over_flexible_two_not() -> None:
     assert is_over_flexible(bent)
     assert is_over_flexible([*bent, on("sensor-clipping", drops.FORCE)])
     assert not is_over_flexible([shaped])
-    assert is_pliant([soil[0], shaped])
-    assert not is_pliant(soil)
-    assert not is_pliant([shaped, on("mass", None)])
+    assert is_flexible_soil([soil[0], shaped])
+    assert not is_flexible_soil(soil)
+    assert not is_flexible_soil([shaped, on("mass", None)])
 
 
 def test_a_small_gain_is_not_named_and_a_sensor_goes_by_time() -> None:

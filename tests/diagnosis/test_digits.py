@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.rounding import decimals, to_the_last_digit
+from rollover.diagnosis.data.rounding import decimals, with_rounding_uncertainty
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -29,20 +29,20 @@ def test_digits_behind_the_point_are_those_that_are_written(value: float, many: 
 def test_what_is_rounded_is_known_to_half_its_last_digit_evenly() -> None:
     """A value that lies evenly within 10^-d has the variance 10^-2d/12."""
     first, second = stated(**{SPEED: 1.9, "initiation.lead_time": 0.02}), stated(**{SPEED: 2.19, MASS: 132.0})
-    found, said = to_the_last_digit([("a", first), ("b", second)])
+    found, said = with_rounding_uncertainty([("a", first), ("b", second)])
     assert [r.uncertainty for _, r in found] == [
         {SPEED: pytest.approx(0.01 / math.sqrt(12.0))},
         {SPEED: pytest.approx(0.01 / math.sqrt(12.0)), MASS: pytest.approx(1.0 / math.sqrt(12.0))},
     ]
     assert [line.partition(" ")[0] for line in said] == [SPEED, MASS]
-    assert to_the_last_digit(found) == (found, [])  # it is said now
+    assert with_rounding_uncertainty(found) == (found, [])  # it is said now
 
 
 @pytest.mark.parametrize("speeds", [(1.5, 3.0), (2.0 / 3.0,), (1.234, 2.5), (0.0,)])
 def test_what_may_be_nominal_or_is_given_in_full_has_no_rounding(speeds: tuple[float, ...]) -> None:
     """1.5 is so to 2 %, 1.234 to 0.02 %."""
     given = [(str(v), stated(**{SPEED: v})) for v in speeds]
-    assert to_the_last_digit(given) == (given, [])
+    assert with_rounding_uncertainty(given) == (given, [])
 
 
 def test_rounded_speeds_are_no_mismatch() -> None:

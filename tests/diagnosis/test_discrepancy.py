@@ -18,12 +18,12 @@ from rollover.diagnosis.inference.discrepancy import (
     MEDIAN,
     SPREAD,
     Discrepancy,
-    beside,
     correlation_times,
     estimated,
-    left_beyond_noise,
+    learned_from_references,
     posterior,
-    taught,
+    residual_rms,
+    with_discrepancy,
 )
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
@@ -57,12 +57,12 @@ def judged(
         one = dataset_of(name, r, simulator_of(scenario(), r))
         assert one is not None
         found.append(one)
-    found = beside(found, Discrepancy(scales=shares, times=times or {})) if shares is not None else found
+    found = with_discrepancy(found, Discrepancy(scales=shares, times=times or {})) if shares is not None else found
     problem = Problem(found)
     align(problem)
     base = problem.fit((), ())
     assert base is not None
-    problem.with_noise_model(autoregression.quiet(problem.dataset, problem.residuals(base)))
+    problem.with_noise_model(autoregression.with_noise_of_quiet_stretches(problem.dataset, problem.residuals(base)))
     return problem
 
 
@@ -84,12 +84,12 @@ def test_what_is_left_beyond_noise_is_the_wave_that_was_added() -> None:
     problem = judged(bent(0.02))
     base = problem.fit((), ())
     assert base is not None
-    left = left_beyond_noise(problem, base)
+    left = residual_rms(problem, base)
     assert left == {FORCE: pytest.approx(0.02, rel=0.35), DEPTH: pytest.approx(0.02, rel=0.35)}
     nothing = judged(recorded({}, 3, noise=0.003))
     base = nothing.fit((), ())
     assert base is not None
-    assert max(left_beyond_noise(nothing, base).values()) < 0.002
+    assert max(residual_rms(nothing, base).values()) < 0.002
 
 
 def test_a_wave_of_the_estimated_scale_is_no_mismatch() -> None:
@@ -120,13 +120,13 @@ def test_references_teach_the_scale_unless_noise_hides_it() -> None:
     problem = judged(bent(0.02))
     base = problem.fit((), ())
     assert base is not None
-    learned = taught(problem, base)
+    learned = learned_from_references(problem, base)
     assert learned is not None
     assert learned.scales[DEPTH] == pytest.approx(0.02, rel=0.35)
     loud = judged(recorded({}, 3, noise=0.05))
     base = loud.fit((), ())
     assert base is not None
-    assert taught(loud, base) is None
+    assert learned_from_references(loud, base) is None
 
 
 def test_samples_of_two_correlation_times_share_one_error() -> None:
@@ -141,7 +141,7 @@ def test_samples_of_two_correlation_times_share_one_error() -> None:
 def test_a_discrepancy_is_of_its_channel_and_above_the_noise() -> None:
     problem = judged(recorded({}, 3, noise=0.01), {DEPTH: 0.05})
     for e in problem.dataset:
-        sizes = {s.channel: e.error_of(s) * s.span / s.noise for s in e.signals}
+        sizes = {s.channel: e.model_error_of(s) * s.span / s.noise for s in e.signals}
         assert sizes[DEPTH] == pytest.approx(5.0, rel=0.25)
         assert sizes[FORCE] == pytest.approx(SETTINGS.data.dataset.other_error_share, rel=0.03)
         assert all(e.model_error_dominates(s) for s in e.signals)

@@ -152,7 +152,7 @@ def test_what_was_bent_to_do_anothers_work_is_straight_beside_it(leaves: float, 
 
     best = made((wide, other), (0.25, 0.6, 0.5, 0.7))
     found = replace(step(best), rivals=(best,))
-    after = simplification._straightened(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, rate])), found)
+    after = simplification._in_usual_shapes(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, rate])), found)
     assert begun == [(0.25, 0.5), (0.25, 0.5, 0.7), (0.25, 0.6, 0.5)]
     assert (after is None) == (not straight)
     if after is not None:
@@ -169,12 +169,12 @@ def test_what_draws_any_curve_is_not_followed_but_straightened(
     problem = SimpleNamespace(effort=SimpleNamespace(is_ensemble=False), dataset=[])
     monkeypatch.setattr(simplification, "mismatch_of", lambda *_: SimpleNamespace(p_value=1e-9))
     monkeypatch.setattr(simplification, "is_over_flexible", lambda _: is_a_curve)
-    monkeypatch.setattr(simplification, "traced_too", lambda _, f: traced.append(f) or f)
+    monkeypatch.setattr(simplification, "with_thresholds_traced", lambda _, f: traced.append(f) or f)
     for name in ("timed", "polish", "ended"):
         monkeypatch.setattr(simplification, name, lambda _, f: f)
     monkeypatch.setattr(simplification, "simpler", lambda *_: None)
     straight = step(fitted("soil-stiffness", 4.0, (0.7, 0.3)))
-    monkeypatch.setattr(simplification, "_straightened", lambda *_: straight)
+    monkeypatch.setattr(simplification, "_in_usual_shapes", lambda *_: straight)
     found, _ = simplification.followed(
         cast(Inquiry, SimpleNamespace(problem=problem, phases=[], candidates=[])), step(best)
     )
@@ -222,7 +222,7 @@ def test_two_thresholds_at_one_place_are_one_and_a_stiffness(leaves: float, poli
     others = [replace(plain, kind="sensor"), replace(plain, search={"a": Search(0, 1), "b": Search(0, 1)})]
     best, rival = fitted("soil-crust", 5.0, (0.7, 0.4, 0.3)), fitted("mass", 9.0, (0.7, 0.2))
     there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[plain, *others, best.candidates[0]], problem=None))
-    found = simplification.plainer(there, step(best, rival))
+    found = simplification.with_fewer_parameters(there, step(best, rival))
     assert {j.candidates[-1].id for j in asked} == {"soil-stiffness"}
     ways = [("fit", SETTINGS.selection.forward_step.short_rounds), ("fit", None), ("polish", None)]
     assert [(j.how, j.rounds) for j in asked] == ways[: 2 + taken]
@@ -251,7 +251,7 @@ def test_either_of_two_thresholds_may_be_a_stiffness(family: str, taken: bool) -
 
     problem = SimpleNamespace(fit=lambda c, x, **_: left(c, x, 400.0), effort=SETTINGS.forward.drops)
     there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, crust, plain], problem=problem))
-    found = simplification.plainer(there, step(left((layer, crust), (0.4, 0.5, 0.3, 0.6), 5.0)))
+    found = simplification.with_fewer_parameters(there, step(left((layer, crust), (0.4, 0.5, 0.3, 0.6), 5.0)))
     assert (found is not None) is taken
     if found is not None:
         assert [c.id for c in found.fitted.candidates] == ["soil-crust", "soil-stiffness"]
@@ -264,7 +264,7 @@ def test_an_effect_by_itself_is_not_given_for_a_plainer_one() -> None:
     both = fitted("soil-crust", 5.0, (0.7, 0.4, 0.3))
     alone = replace(both, candidates=both.candidates[1:], x=both.x[1:])
     there = cast(Inquiry, SimpleNamespace(candidates=[both.candidates[0]], problem=None))
-    assert simplification.plainer(there, step(alone)) is None
+    assert simplification.with_fewer_parameters(there, step(alone)) is None
 
 
 @pytest.mark.parametrize(("profile_extents", "known"), [(5.5, 40.0), (5.5, None), (50.0, 40.0)])
@@ -296,7 +296,7 @@ def test_what_mirrors_the_last_effect_competes_with_it(profile_extents: float, k
     best = left((stiff, crust), (0.5, 0.4, 0.75), 5.0)
     rivals = [] if known is None else [left((stiff, layer), (0.5, 0.4, 0.5), known)]
     there = cast(Inquiry, SimpleNamespace(fits=fits, free=lambda _: [layer]))
-    found = simplification.mirrored(there, step(best, *rivals))
+    found = simplification.with_mirror_rivals(there, step(best, *rivals))
     assert found.fitted is best
     if known is not None and profile_extents > known:
         assert [f.left for f in found.rivals] == pytest.approx([5.0, known])

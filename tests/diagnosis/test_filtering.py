@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rollover import scenario
-from rollover.diagnosis.forward.averaging import simulated, thinned
+from rollover.diagnosis.forward.averaging import block_averaged, simulated
 from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN
 from rollover.diagnosis.forward.filtering import rows_of
 from rollover.diagnosis.forward.forward_model import DropSimulator
@@ -85,11 +85,11 @@ def test_means_of_rows_behind_a_filter_are_those_of_all_rows(whole: dict[str, ND
 
 def test_a_full_run_keeps_the_rate_of_its_filters() -> None:
     recording = recorded(FAST)
-    thin, inside = thinned(recording, 1800.0)
+    thin, inside = block_averaged(recording, 1800.0)
     assert inside is not None
     assert inside.shape[1] == 5
     assert 1.0 / float(np.median(np.diff(thin.time))) > 1800.0
-    assert thinned(recording, 6000.0) == (recording, None)
+    assert block_averaged(recording, 6000.0) == (recording, None)
 
 
 def test_a_simulator_in_another_process_is_what_it_was_here() -> None:

@@ -17,10 +17,10 @@ from rollover.diagnosis import diagnose, diagnosed_text
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.fit import levenberg_marquardt
 from rollover.diagnosis.fit.jobs import Executor, Task, work
-from rollover.diagnosis.fit.levenberg_marquardt import Problem, ResidualBlock, shift_of
+from rollover.diagnosis.fit.levenberg_marquardt import Problem, ResidualBlock, time_shift_step
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.forward.averaging import simulated
-from rollover.diagnosis.forward.discontinuities import about_jumps
+from rollover.diagnosis.forward.discontinuities import largest_jump_nearby
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.restarts import _best_middle
 from rollover.diagnosis.settings import SETTINGS
@@ -70,7 +70,7 @@ def test_a_leap_is_forgiven_within_a_sample_and_not_beyond() -> None:
 
 def test_about_a_jump_lie_the_samples_that_it_may_fall_to() -> None:
     times = np.array([0.0, 1.0, 2.0, 3.0])
-    found = about_jumps(times, np.array([-0.5, 1.5, 1.7, 9.0]), np.array([5.0, -2.0, 3.0, 4.0]))
+    found = largest_jump_nearby(times, np.array([-0.5, 1.5, 1.7, 9.0]), np.array([5.0, -2.0, 3.0, 4.0]))
     assert found.tolist() == [5.0, 3.0, 3.0, 4.0]
 
 
@@ -95,11 +95,11 @@ def test_a_clock_goes_less_far_where_all_of_its_way_leaves_more() -> None:
     before = problem.block(0, (), (), problem.shifts[0], 0.0)
     assert before is not None
     far, near = (problem.block(0, (), (), before.shift + d, 0.0) for d in (8e-3, 1e-6))
-    back = problem._less_far(0, (), (), before, far)
+    back = problem._backtracked_shift(0, (), (), before, far)
     assert back is not None
     assert back.shift == before.shift
-    assert problem._less_far(0, (), (), replace(before, residual=2.0 * before.residual), near) is near
-    assert problem._less_far(0, (), (), before, None) is None
+    assert problem._backtracked_shift(0, (), (), replace(before, residual=2.0 * before.residual), near) is near
+    assert problem._backtracked_shift(0, (), (), before, None) is None
 
 
 def test_a_linearised_residual_knows_its_robust_weight() -> None:
@@ -116,8 +116,8 @@ def test_time_shifts_stay_where_their_clock_can_be(late: float) -> None:
     slope = np.linspace(-1.0, 1.0, 40)
     block = ResidualBlock(residual=late * slope, J=np.zeros((40, 0)), slope=slope, shift=0.5, prior=1.0)
     free = ResidualBlock(residual=0.1 * slope, J=np.zeros((40, 0)), slope=slope, shift=0.0, prior=1.0)
-    assert 0.5 + shift_of(block, np.zeros(0)) == pytest.approx(np.sign(late) * 4.0)
-    assert 0.0 < shift_of(free, np.zeros(0)) < 0.1
+    assert 0.5 + time_shift_step(block, np.zeros(0)) == pytest.approx(np.sign(late) * 4.0)
+    assert 0.0 < time_shift_step(free, np.zeros(0)) < 0.1
 
 
 def test_a_stiffness_far_off_is_found_from_every_start() -> None:

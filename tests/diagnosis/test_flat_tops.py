@@ -9,9 +9,9 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import dataset_of
-from rollover.diagnosis.data.quantisation import digitised
+from rollover.diagnosis.data.quantisation import with_quantisation
 from rollover.diagnosis.forward.averaging import simulated
-from rollover.diagnosis.inference.clipping import cut_off
+from rollover.diagnosis.inference.clipping import clipped_channels
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, recorded, scenario
@@ -30,7 +30,7 @@ def blows(ends: tuple[float, ...], peaks: tuple[float, ...] = (5e3, 6e3, 7e3)) -
 
 
 def test_what_ends_at_one_value_in_several_recordings_is_cut_off() -> None:
-    (named,), places = cut_off("abc", blows((4200.0, 4200.0, 4200.0)), PHASES)
+    (named,), places = clipped_channels("abc", blows((4200.0, 4200.0, 4200.0)), PHASES)
     assert (named.id, named.kind, named.channel) == ("sensor-clipping", "sensor", FORCE)
     assert named.parameters["limit"].value == 4200.0
     assert named.settings == {"channel": FORCE, "limit": 4200.0}
@@ -50,7 +50,7 @@ def test_what_ends_at_one_value_in_several_recordings_is_cut_off() -> None:
     ],
 )
 def test_what_ends_elsewhere_or_goes_beyond_is_not(ends: tuple[float, ...], peaks: tuple[float, ...]) -> None:
-    assert cut_off("abc", blows(ends, peaks), PHASES) == ((), ())
+    assert clipped_channels("abc", blows(ends, peaks), PHASES) == ((), ())
 
 
 def cut(share: float) -> tuple[list[tuple[str, Recording]], float]:
@@ -74,6 +74,6 @@ def test_slight_clipping_is_named_where_all_else_agrees() -> None:
 
 def test_a_limit_is_looked_for_where_values_end_too() -> None:
     made, end = cut(0.8)
-    found = digitised([dataset_of(n, *simulated(scenario(), r)) for n, r in made], [r for _, r in made])
+    found = with_quantisation([dataset_of(n, *simulated(scenario(), r)) for n, r in made], [r for _, r in made])
     limit = next(c for c in candidates_of(found, (), "drop") if c.key == f"sensor-clipping:{FORCE}")
     assert any(limit.values(x)["limit"] == pytest.approx(end) for x in limit.probes())

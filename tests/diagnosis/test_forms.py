@@ -51,7 +51,7 @@ def test_of_fits_that_lead_to_one_place_one_is_followed(ends: tuple[float, ...],
         return fitted(BENT, x, 8.0)
 
     problem, start = cast(Problem, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
-    best = model_variants._best_of(problem, start, BENT, [(0.3, v) for v in begun], [b.total for b in start.blocks])
+    best = model_variants._best_from(problem, start, BENT, [(0.3, v) for v in begun], [b.total for b in start.blocks])
     assert whole == followed
     assert best is not None
     assert best.x == (0.3, followed[0])
@@ -79,7 +79,7 @@ def test_of_short_fits_to_one_minimum_one_goes_on(near: list[tuple[float, float]
         return fitted(BENT, x, 9.0)
 
     problem, start = cast(Problem, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
-    model_variants._best_of(problem, start, BENT, [(0.3, v) for v, _ in near], [b.total for b in start.blocks])
+    model_variants._best_from(problem, start, BENT, [(0.3, v) for v, _ in near], [b.total for b in start.blocks])
     assert begun == gone_on_with
 
 
@@ -98,7 +98,7 @@ def test_far_from_noise_a_variant_that_soon_gains_is_followed(left: float, soon:
         return fitted(BENT, x, soon)
 
     problem, start = cast(Problem, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), left)
-    best = model_variants._best_of(problem, start, BENT, [(0.3, 0.4)], [b.total for b in start.blocks])
+    best = model_variants._best_from(problem, start, BENT, [(0.3, 0.4)], [b.total for b in start.blocks])
     assert (best is not None) is bool(whole) is is_followed
 
 
@@ -114,7 +114,9 @@ def test_misled_variants_restart_from_the_usual_one_on_all() -> None:
         least[:] = [1.0] if tuple(x) == stands else least
         return fitted(candidates[-1], x, 30.0 if len(x) == 1 else least[0])
 
-    found = model_variants.shaped(cast(Problem, SimpleNamespace(fit=fit)), start, [b.total for b in start.blocks])
+    found = model_variants.with_fitted_shape(
+        cast(Problem, SimpleNamespace(fit=fit)), start, [b.total for b in start.blocks]
+    )
     assert found is not None
     assert len(found.x) == 2
     assert model_variants.is_noise(found)
@@ -143,7 +145,9 @@ def test_a_variant_near_its_rivals_misfit_is_followed(leaves: float, soon: float
     size = sum(b.residual.size for b in lead.blocks)
     scale = leaves * size / lead.total  # blocks of chance: what they leave is nearly their number
     problem = cast(Problem, SimpleNamespace(fit=lambda *a, **k: _scaled(fit(*a, **k), scale)))
-    model_variants._best_of(problem, _scaled(start, scale), BENT, [(0.3, 0.4)], [scale * b.total for b in lead.blocks])
+    model_variants._best_from(
+        problem, _scaled(start, scale), BENT, [(0.3, 0.4)], [scale * b.total for b in lead.blocks]
+    )
     assert len(made) == whole
 
 

@@ -11,11 +11,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.cross_validation import held_out, refitted
+from rollover.diagnosis.fit.cross_validation import cross_validated_by_refits, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.scan_jobs import serial_map
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.forward_step import _by_fits
+from rollover.diagnosis.selection.forward_step import _refitted_where_slopes_mislead
 from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import GAIN, candidate, judge_of
 
@@ -26,18 +26,18 @@ def test_held_out_data_are_predicted_by_refits_if_nonlinear() -> None:
     fitted = problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
     assert fitted is not None
     groups = [[0], [1], [2]]
-    assert refitted(problem, fitted, groups) is fitted
+    assert cross_validated_by_refits(problem, fitted, groups) is fitted
     pulled = [b.residual + 3.0 * b.J[:, 0] / np.linalg.norm(b.J) for b in fitted.blocks[1:]]
     misled = [replace(b, J=0.01 * b.J, residual=w) for b, w in zip(fitted.blocks[1:], pulled, strict=True)]
     flat = replace(fitted, blocks=(fitted.blocks[0], *misled))
     assert held_out(flat, groups).total > 2.0
-    cross_validated = refitted(problem, flat, groups)
+    cross_validated = cross_validated_by_refits(problem, flat, groups)
     assert cross_validated.x == fitted.x
     assert held_out(cross_validated, groups).total == pytest.approx(held_out(fitted, groups).total, rel=0.01)
-    assert refitted(problem, flat, groups[:1]) is flat
+    assert cross_validated_by_refits(problem, flat, groups[:1]) is flat
     ahead = held_out(fitted, groups).total
-    assert refitted(problem, fitted, groups, ahead + 1e-6) is fitted
-    again = refitted(problem, fitted, groups, ahead - 1e-6)  # no better than without it, by its slopes
+    assert cross_validated_by_refits(problem, fitted, groups, ahead + 1e-6) is fitted
+    again = cross_validated_by_refits(problem, fitted, groups, ahead - 1e-6)  # no better than without it, by its slopes
     assert again.cross_validated is not None
     assert held_out(again, groups).total == pytest.approx(ahead, rel=0.01)
 
@@ -66,9 +66,9 @@ def test_the_best_fit_is_cross_validated_by_refits_in_doubt() -> None:
     inquiry = cast(
         Inquiry, SimpleNamespace(problem=problem, groups=groups, executor=SimpleNamespace(parallel_map=parallel_map))
     )
-    new, beside = _by_fits(inquiry, [lead, rival])
+    new, beside = _refitted_where_slopes_mislead(inquiry, [lead, rival])
     assert beside is rival
     assert new.cross_validated is not None
     assert held_out(new, groups).left.sum() == pytest.approx(ahead, rel=0.01)
     assert asked == [groups]
-    assert _by_fits(inquiry, [fitted, rival])[0] is fitted  # it foretells best as it is
+    assert _refitted_where_slopes_mislead(inquiry, [fitted, rival])[0] is fitted  # it foretells best as it is

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis.data.quantisation import digitised
+from rollover.diagnosis.data.quantisation import with_quantisation
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
@@ -185,10 +185,10 @@ def test_disagreeing_recordings_widen_intervals_by_student_t() -> None:
         each = rng.standard_normal(4)
         blocks = [ResidualBlock(residual=x * J[:, 0], J=J, slope=np.zeros(40), shift=0.0, prior=1e-3) for x in each]
         inverse = 1.0 / np.array([[4.0 * float(J[:, 0] @ J[:, 0])]])
-        sd = np.sqrt(stated.disagreeing([own] * 4, blocks, inverse)[0])
+        sd = np.sqrt(stated.between_recording_variance([own] * 4, blocks, inverse)[0])
         inside.append(abs(each.mean()) < SETTINGS.inference.local_quadratic.normal_quantile * sd)
     assert np.mean(inside) == pytest.approx(0.95, abs=0.014)  # 4 standard errors
-    assert np.all(stated.disagreeing([own] * 2, blocks[:2], inverse) == 0.0)  # two are too few
+    assert np.all(stated.between_recording_variance([own] * 2, blocks[:2], inverse) == 0.0)  # two are too few
 
 
 def test_an_unidentified_value_of_full_runs_keeps_its_range() -> None:
@@ -247,7 +247,7 @@ def test_a_number_of_an_effect_stays_where_it_can_be() -> None:
 def read(recordings: list[tuple[str, Recording]]) -> Problem:
     """Recordings made ready as a diagnosis does: many samples averaged, what the recorder makes of each kept."""
     made = judge_of(recordings).dataset
-    return Problem(digitised(made, [r for _, r in recordings]))
+    return Problem(with_quantisation(made, [r for _, r in recordings]))
 
 
 @pytest.mark.parametrize("rate", [300.0, 9000.0])  # of the faster several samples are averaged into one
@@ -268,7 +268,7 @@ def test_an_end_of_a_range_is_read_off_where_samples_pile_up(limit: float, rate:
 
 def test_a_peak_that_is_met_once_is_no_end_of_a_range() -> None:
     problem = read(recorded({}, noise=0.02))
-    assert stated.end_of(problem.dataset, FORCE) is None
+    assert stated.full_scale_of(problem.dataset, FORCE) is None
 
 
 def test_without_slopes_an_interval_ends_by_the_misfit() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.selection import pairs
-from rollover.diagnosis.selection.pair_score import jointly
+from rollover.diagnosis.selection.pair_score import best_direction_pairs
 from rollover.diagnosis.selection.score_test import ScoreTest, score_test
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
@@ -26,7 +26,7 @@ def test_pair_gain_and_step_are_those_of_least_squares() -> None:
     rng = np.random.default_rng(1)
     D = unit(rng.standard_normal((60, 6)))
     misfit = 3.0 * rng.standard_normal(60)
-    found = jointly(D.T @ misfit, D.T @ D, list("abcdef"))
+    found = best_direction_pairs(D.T @ misfit, D.T @ D, list("abcdef"))
     assert len(found) == 15
     told = {}
     for i, j in itertools.combinations(range(6), 2):
@@ -46,7 +46,7 @@ def test_two_that_gain_nothing_alone_may_gain_all_together() -> None:
     second = np.cos(0.2) * first + np.sin(0.2) * across
     misfit = 30.0 * (np.cos(0.1) * across - np.sin(0.1) * first)  # at right angles to their mean
     D = np.stack([first, second, other], axis=1)
-    best, *_ = jointly(D.T @ misfit, D.T @ D, ["layer", "crust", "mass"])
+    best, *_ = best_direction_pairs(D.T @ misfit, D.T @ D, ["layer", "crust", "mass"])
     assert best.places == (0, 1)
     assert best.gain == pytest.approx(900.0, rel=1e-9)
     assert np.max((D.T @ misfit) ** 2) < 0.011 * 900.0
@@ -56,7 +56,7 @@ def test_collinear_directions_gain_nothing_together() -> None:
     first, across = np.eye(40)[:2]
     D = np.stack([first, np.cos(0.01) * first + np.sin(0.01) * across], axis=1)
     misfit = 5.0 * across
-    found = jointly(D.T @ misfit, D.T @ D, ["one", "other"])
+    found = best_direction_pairs(D.T @ misfit, D.T @ D, ["one", "other"])
     assert all(b.gain == 0.0 for b in found)
 
 
@@ -64,7 +64,7 @@ def test_pairs_take_the_best_directions_of_two_effects() -> None:
     rng = np.random.default_rng(3)
     D = unit(rng.standard_normal((200, 40)))
     owners = [f"{k // 2}" for k in range(40)]  # two directions each: 190 pairs of owners
-    found = jointly(D.T @ rng.standard_normal(200), D.T @ D, owners)
+    found = best_direction_pairs(D.T @ rng.standard_normal(200), D.T @ D, owners)
     assert len(found) == SETTINGS.selection.pair_score.most_pairs
     told = [frozenset(owners[k] for k in b.places) for b in found]
     assert len(set(told)) == SETTINGS.selection.pair_score.most_pairs
@@ -107,7 +107,7 @@ def test_near_noise_slopes_suggest_pairs_but_no_any_curve(monkeypatch: pytest.Mo
     asking = inquiry(asked)
     object.__setattr__(asking, "say", lambda _: None)
     object.__setattr__(asking, "candidates", [MASS, DAMPING, NOSE])
-    monkeypatch.setattr(pairs, "_placed_anew", lambda *_: [])
+    monkeypatch.setattr(pairs, "_with_thresholds_scanned", lambda *_: [])
     monkeypatch.setattr(pairs, "_takes_little", lambda *_: True)
     for far in (False, True):
         asked.clear()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.fit.cross_validation import cross_validated, held_out
-from rollover.diagnosis.fit.ensemble_mean import left_of_means
+from rollover.diagnosis.fit.ensemble_mean import ensemble_mean_misfit
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
@@ -22,16 +22,16 @@ from rollover.diagnosis.selection import ensemble_validation as believed
 from rollover.diagnosis.selection import stepwise
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.ensemble_validation import (
-    astray,
-    backed,
-    before_the_impact,
-    begun_anew,
+    counted_in_full,
     ensemble_validated,
     is_shared,
     is_there,
     is_validated,
-    unbent,
-    unforgiven,
+    judged_before_impact,
+    restarted_base,
+    with_full_weights,
+    with_shifts_near_prior,
+    without_unsupported_rivals,
 )
 from rollover.diagnosis.selection.forward_step import _chosen
 from rollover.diagnosis.selection.score_test import ScoreTest
@@ -166,10 +166,10 @@ def test_what_all_recordings_do_after_a_blow_is_no_chance(others: int, in_full: 
         return replace(f, blocks=tuple(replace(no_jacobian, heavy_tail=heavy_tail) for heavy_tail in of))
 
     problem: Any = SimpleNamespace(heavy_tailed=False, again=again)
-    found = astray(problem, Fitted(candidates=(), x=(), blocks=(no_jacobian,) * 4))
+    found = with_full_weights(problem, Fitted(candidates=(), x=(), blocks=(no_jacobian,) * 4))
     assert problem.heavy_tailed is not in_full
     assert sum(b.heavy_tail is not None for b in found.blocks) == (0 if in_full else others)
-    held = unforgiven(problem, Fitted(candidates=(), x=(), blocks=(no_jacobian,) * 4))
+    held = counted_in_full(problem, Fitted(candidates=(), x=(), blocks=(no_jacobian,) * 4))
     assert problem.heavy_tailed  # for what explains it
     assert sum(b.heavy_tail is not None for b in held.blocks) == (0 if in_full else others)
 
@@ -208,7 +208,7 @@ def test_what_admits_a_step_speaks_for_its_best(monkeypatch: pytest.MonkeyPatch,
     one = Fitted(candidates=(candidate("slope", "physics", "a"),), x=(0.5,), blocks=())
     looked = ScoreTest(score=score, scores={"slope": score}, null=null, detectable={})
     inquiry: Any = SimpleNamespace(problem=SimpleNamespace(effort=SETTINGS.forward.runs), groups=[])
-    stepwise.upheld(inquiry, Step(base=one, fitted=one, p_value=p, rivals=(one,)), looked)
+    stepwise.validated_step(inquiry, Step(base=one, fitted=one, p_value=p, rivals=(one,)), looked)
     assert seen == [kept]
 
 
@@ -219,12 +219,17 @@ def test_a_rival_that_nothing_spoke_for_is_none() -> None:
     null = np.sort(np.random.default_rng(0).standard_normal((4000, 20)).max(axis=1) ** 2)
     looked = ScoreTest(score=60.0, scores={"slope": 60.0, "mass": 4.0}, null=null, detectable={})
     step = Step(base=fits[0], fitted=fits[1], p_value=0.0, rivals=tuple(fits))
-    assert backed(step, looked).rivals == (fits[0],)
-    assert backed(step, replace(looked, far={"inertia": ((0.9,),)})).rivals == (fits[0], fits[2])  # its runs did
+    assert without_unsupported_rivals(step, looked).rivals == (fits[0],)
+    assert without_unsupported_rivals(step, replace(looked, far={"inertia": ((0.9,),)})).rivals == (
+        fits[0],
+        fits[2],
+    )  # its runs did
     two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
     placed = [Candidate(id=i, kind="physics", family="f", search=two, neutral=(None, 0.5)) for i in ("slope", "mass")]
     same_family = [Fitted(candidates=(c,), x=(0.5, 0.5), blocks=()) for c in placed]
-    assert backed(replace(step, rivals=(*same_family, fits[2])), looked).rivals == tuple(same_family)
+    assert without_unsupported_rivals(replace(step, rivals=(*same_family, fits[2])), looked).rivals == tuple(
+        same_family
+    )
 
 
 def test_what_shows_before_the_blow_alone_lasts() -> None:
@@ -243,7 +248,7 @@ def test_what_shows_before_the_blow_alone_lasts() -> None:
     )
     groups = [[k] for k in range(4)]
     assert not is_validated(whole, groups)
-    assert is_validated(before_the_impact(Problem(every), whole), groups)
+    assert is_validated(judged_before_impact(Problem(every), whole), groups)
 
 
 def test_a_base_is_begun_where_its_rivals_are() -> None:
@@ -253,10 +258,10 @@ def test_a_base_is_begun_where_its_rivals_are() -> None:
     bent = problem.block(0, (), (), 3.0 * problem.dataset[0].shift_prior, problem.effort.fine)
     assert bent is not None
     base = Fitted(candidates=(), x=(), blocks=(bent,))
-    assert begun_anew(problem, base).blocks[0].shift == 0.0
-    assert unbent(problem, base).blocks[0].shift == problem.dataset[0].shift_prior
-    good = begun_anew(problem, base)
-    assert begun_anew(problem, good).blocks[0].total <= good.blocks[0].total
+    assert restarted_base(problem, base).blocks[0].shift == 0.0
+    assert with_shifts_near_prior(problem, base).blocks[0].shift == problem.dataset[0].shift_prior
+    good = restarted_base(problem, base)
+    assert restarted_base(problem, good).blocks[0].total <= good.blocks[0].total
 
 
 def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -282,12 +287,12 @@ def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyP
     assert right is not None
     assert lucky is not None
     assert lucky.left < right.left
-    assert left_of_means(problem, right)[0] < 0.5 * right.left
-    assert left_of_means(problem, lucky)[0] > 10.0 * left_of_means(problem, right)[0]
+    assert ensemble_mean_misfit(problem, right)[0] < 0.5 * right.left
+    assert ensemble_mean_misfit(problem, lucky)[0] > 10.0 * ensemble_mean_misfit(problem, right)[0]
     early = [replace(e, first_impact=TIME[20]) for e in every]
     problem.with_noise_model(early)
     part = sum(float(b.residual[:20] @ b.residual[:20]) + (b.shift / b.prior) ** 2 for b in base.blocks)
-    assert left_of_means(problem, base)[1] == pytest.approx(part, rel=0.01)
+    assert ensemble_mean_misfit(problem, base)[1] == pytest.approx(part, rel=0.01)
     problem.with_noise_model(every)
     found = ensemble_validated(
         problem, Step(base=base, fitted=lucky, p_value=0.0, rivals=(lucky, right)), [[k] for k in range(4)]
@@ -377,7 +382,7 @@ def test_other_courses_are_counted_otherwise_where_nothing_lasts(
     inquiry = Inquiry(
         problem=problem, candidates=[], groups=[], phases=[], say=lambda _: None, executor=cast(Any, None)
     )
-    found = stepwise.counted_otherwise(inquiry, current)
+    found = stepwise.with_other_weighting(inquiry, current)
     able = others > 1 or not heavy_tailed
     assert seen == [not heavy_tailed] * able
     assert (found is not None) == (able and lasts)
@@ -390,11 +395,11 @@ def test_a_strength_is_judged_as_it_is_held(heavy_tailed: bool, masked: bool, mo
     problem = Problem([])
     problem.heavy_tailed = heavy_tailed
 
-    def astray(problem: Any, fitted: Fitted) -> Fitted:
+    def with_full_weights(problem: Any, fitted: Fitted) -> Fitted:
         problem.heavy_tailed = masked
         return fitted
 
-    monkeypatch.setattr(believed, "astray", astray)
+    monkeypatch.setattr(believed, "astray", with_full_weights)
     monkeypatch.setattr(believed, "is_there", lambda problem, _: problem.heavy_tailed)
-    assert believed.is_there_as_held(problem, Fitted(candidates=(), x=(), blocks=())) is masked
+    assert believed.is_significant_as_held(problem, Fitted(candidates=(), x=(), blocks=())) is masked
     assert problem.heavy_tailed is heavy_tailed

@@ -12,8 +12,8 @@ import pytest
 
 from rollover.diagnosis.fit.jobs import Executor, Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.local_search import without
-from rollover.diagnosis.selection.forward_step import reused_of
+from rollover.diagnosis.fit.local_search import without_effect
+from rollover.diagnosis.selection.forward_step import reusable_slopes
 from rollover.diagnosis.selection.scan import look
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.test_looks import judge_of as looks_of
@@ -61,7 +61,7 @@ def base_at(problem: Problem, x: float) -> Fitted:
 
 
 def fitted(problem: Problem, start: Place, base: Fitted | None) -> Fitted:
-    reused = None if base is None else reused_of(problem, base)
+    reused = None if base is None else reusable_slopes(problem, base)
     found = problem.fit((SLOPE, MASS), start, width=1, reused=reused)
     assert found is not None
     return found
@@ -121,7 +121,7 @@ def test_a_fit_ends_with_the_slopes_of_a_place_beside_it(is_beside: bool, monkey
 
 def test_a_fit_cut_short_ends_with_its_own_jacobian() -> None:
     problem, runs = judge_of(0.5, 0.6)
-    reused = reused_of(problem, base_at(problem, 0.2))
+    reused = reusable_slopes(problem, base_at(problem, 0.2))
     found = problem.fit((SLOPE, MASS), (0.2, 0.2), width=1, rounds=1, reused=reused)
     assert found is not None
     x, o = found.x
@@ -134,7 +134,7 @@ def test_a_reduced_fit_starts_with_the_others_columns(effort: Any, is_lent: bool
     whole = problem.fit((SLOPE, MASS), (0.5, 0.6))
     assert whole is not None
     runs.asked.clear()
-    rest = without(problem, whole, 1, no_jacobian=True)
+    rest = without_effect(problem, whole, 1, no_jacobian=True)
     assert rest is not None
     assert rest.candidates == (SLOPE,)
     assert all(o == 0.0 for _, o in runs.asked)
@@ -146,14 +146,14 @@ def test_a_reduced_fit_starts_with_the_others_columns(effort: Any, is_lent: bool
 def test_slopes_are_lent_where_they_cost_runs_alone() -> None:
     problem, _ = judge_of(0.5, 0.6)
     base = base_at(problem, 0.45)
-    reused = reused_of(problem, base, [0])
+    reused = reusable_slopes(problem, base, [0])
     assert reused is not None
     np.testing.assert_array_equal(reused[0], base.blocks[0].J)
     nothing = problem.fit((), ())
     assert nothing is not None
-    assert reused_of(problem, nothing) is None
+    assert reusable_slopes(problem, nothing) is None
     cheap, _ = judge_of(0.5, 0.6, effort=SETTINGS.forward.drops)
-    assert reused_of(cheap, base_at(cheap, 0.45)) is None
+    assert reusable_slopes(cheap, base_at(cheap, 0.45)) is None
 
 
 def test_a_job_with_other_slopes_is_another_job() -> None:
@@ -172,7 +172,7 @@ def test_a_job_asks_for_no_runs_beside_what_is_lent(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(Problem, "fit", lambda *_, **told: wanted.append(told["reused"][0].shape))
     with Executor() as executor:
         task = Task(
-            candidates=(SLOPE, MASS), start=(0.45, 0.2), shifts=(0.0,), width=1, reused=reused_of(problem, base)
+            candidates=(SLOPE, MASS), start=(0.45, 0.2), shifts=(0.0,), width=1, reused=reusable_slopes(problem, base)
         )
         executor.fits(problem, [task])
     assert wanted[-1] == (TIME.size, 1)
@@ -207,7 +207,7 @@ def test_what_counts_otherwise_has_the_slopes_that_it_had() -> None:
 
 def test_no_run_is_announced_beside_what_is_lent(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, _ = judge_of(0.5, 0.6)
-    reused, wanted = reused_of(problem, base_at(problem, 0.45)), list[Place]()
+    reused, wanted = reusable_slopes(problem, base_at(problem, 0.45)), list[Place]()
     monkeypatch.setattr(
         Problem, "made_ahead", lambda _, points: wanted.extend((round(x[0], 9), round(x[1], 9)) for _, _, x in points)
     )

@@ -17,7 +17,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.noise.ensemble import HeavyTail
 from rollover.diagnosis.selection import decision
 from rollover.diagnosis.selection import scan as parallel_map
-from rollover.diagnosis.selection.score_test import ScoreTest, _at_odds, _best_along, _visible, score_test
+from rollover.diagnosis.selection.score_test import ScoreTest, _best_amplitude, _birge_ratio, _visible, score_test
 from rollover.diagnosis.selection.screening import _begun_at, promising
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
@@ -85,11 +85,11 @@ def test_agreeing_recordings_count_in_full_a_lone_one_hardly() -> None:
     D = (d / np.sqrt(np.sum(d * d))).reshape(-1, 1)
     agree = 30.0 * D[:, 0]
     alone = np.where(np.arange(200) < 50, 30.0 * D[:, 0], 0.0)
-    assert _at_odds(agree, D, [50] * 4)[0] == 1.0
+    assert _birge_ratio(agree, D, [50] * 4)[0] == 1.0
     a = np.array([30.0, 0.0, 0.0, 0.0])
     weight = np.sum(D.reshape(4, 50) ** 2, axis=1)
     wanted = np.sum(weight * (a - np.sum(weight * a)) ** 2) / 3.0
-    assert _at_odds(alone, D, [50] * 4)[0] == pytest.approx(wanted, rel=1e-9)
+    assert _birge_ratio(alone, D, [50] * 4)[0] == pytest.approx(wanted, rel=1e-9)
     assert wanted > 10.0
 
 
@@ -207,7 +207,7 @@ def test_the_leader_of_the_robust_screening_is_tried_first(monkeypatch: pytest.M
         return ScoreTest(score=max(scores.values()), scores=scores, null=null, detectable={})
 
     monkeypatch.setattr(parallel_map, "score_test", looked)
-    monkeypatch.setattr(parallel_map, "strongly", lambda *_: {})
+    monkeypatch.setattr(parallel_map, "strong_starts", lambda *_: {})
     problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
     problem.heavy_tailed, problem.effort = False, replace(problem.effort, leaders=3)
     every = [replace(SLOPE, id=f"c{k}", kind="sensor" if k == 9 else "parameter") for k in range(10)]
@@ -279,15 +279,13 @@ def test_no_screening_beside_a_model_without_usable_runs(
     problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
     problem.effort = replace(problem.effort, is_ensemble=is_ensemble)
     first = ScoreTest(score=0.0, scores={}, null=np.zeros(10), detectable={}, only=(0, 2))
-    parallel_map.look_again(problem, base, base, [SLOPE], [[r] for r in range(4)], first)
+    parallel_map.rescored(problem, base, base, [SLOPE], [[r] for r in range(4)], first)
     assert len(asked) == looks_made
     assert asked[0] == ((base, (0, 2)) if is_ensemble else (None, ()))
     if looks_made == 2:
         assert asked[1] == (None, ())
     asked.clear()
-    parallel_map.look_again(
-        problem, base, None, [SLOPE], [[r] for r in range(4)], first
-    )  # where the rest is structured
+    parallel_map.rescored(problem, base, None, [SLOPE], [[r] for r in range(4)], first)  # where the rest is structured
     assert asked == [(None, ())]
 
 
@@ -369,7 +367,7 @@ def test_a_look_goes_as_far_along_a_direction_as_gains_most() -> None:
     D = np.concatenate([as_seen, little])[:, None]
     size = float(np.sqrt(D[:, 0] @ D[:, 0]))
     misfit = np.concatenate([b.residual for b in blocks])
-    along, gains = _best_along(misfit, D / size, blocks)
+    along, gains = _best_amplitude(misfit, D / size, blocks)
 
     def gain(a: float) -> float:
         """Fall of (D9) of the first, which leaves (E + x)(1 - a/sqrt(E + x))^2, and of squares of the second."""

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.fit import ensemble_mean
-from rollover.diagnosis.fit.ensemble_mean import settled
+from rollover.diagnosis.fit.ensemble_mean import refined_under_scatter
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.step import Step
@@ -31,7 +31,7 @@ def test_a_model_far_from_the_ensemble_mean_takes_more_steps() -> None:
     base, far = problem.fit((), ()), problem.fit((SLOPE,), (0.2,), rounds=0)
     assert base is not None
     assert far is not None
-    found = settled(problem, Step(base=base, fitted=far, p_value=0.0, rivals=(far,)))
+    found = refined_under_scatter(problem, Step(base=base, fitted=far, p_value=0.0, rivals=(far,)))
     assert found.fitted.x[0] == pytest.approx(0.6, abs=0.01)
     assert found.rivals == (found.fitted,)
 
@@ -63,7 +63,7 @@ def begun_at(x: float, values: np.ndarray) -> tuple[Problem, Step]:
 def steps(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Places to which it was moved."""
     made: list[Any] = []
-    onward = ensemble_mean._onward
+    onward = ensemble_mean._line_search
 
     def counted(problem: Problem, old: Fitted, dx: np.ndarray) -> Any:
         made.append(onward(problem, old, dx))
@@ -77,14 +77,14 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 def test_a_partial_model_is_not_moved_for_a_small_gain(missing: float, least: int, steps: list[Any]) -> None:
     """Begun 0.02 off: (0.4/1)^2 of what cos(400 t) beside it leaves, (0.4/4)^2 of what four times that does."""
     problem, off = begun_at(0.58, 12.0 * np.sin(30.0 * TIME) + missing * np.cos(400.0 * TIME))
-    found = settled(problem, off).fitted.x
+    found = refined_under_scatter(problem, off).fitted.x
     assert len(steps) >= least if least else (len(steps), found) == (0, (0.58,))
 
 
 @pytest.mark.parametrize(("begun", "is_beside"), [(0.58, True), (0.5, False)])
 def test_slopes_are_renewed_beyond_their_difference_step(begun: float, is_beside: bool, steps: list[Any]) -> None:
     problem, off = begun_at(begun, 12.0 * np.sin(30.0 * TIME))
-    found = settled(problem, off).fitted
+    found = refined_under_scatter(problem, off).fitted
     assert found.x[0] == pytest.approx(0.6, abs=2e-3)
     assert len(steps) > 1
     asked = problem.dataset[0].simulator.asked  # type: ignore[attr-defined]
@@ -121,7 +121,7 @@ def test_a_full_step_is_taken_unless_a_part_is_clearly_better(
     problem: Any = SimpleNamespace(made_ahead=lambda points: announced.extend(round(x[0], 9) for _, _, x in points))
     block = ResidualBlock(residual=np.full(4, 5.0), J=np.zeros((4, 1)), slope=np.zeros(4), shift=0.0, prior=1.0)
     old = Fitted(candidates=(SLOPE,), x=(0.5,), blocks=(block,))
-    there = ensemble_mean._onward(problem, old, np.array([0.1]))
+    there = ensemble_mean._line_search(problem, old, np.array([0.1]))
     assert asked == announced == [0.6, 0.55, 0.65][: len(lefts)]
     assert there == (None if found is None else ([pytest.approx(found)], [1.0]))
 
@@ -131,7 +131,7 @@ def test_rivals_are_not_run_again_in_the_ensemble_refit() -> None:
     rival = problem.fit((MASS,), (0.3,), rounds=0)
     assert rival is not None
     assert all(e.signals[0].weight is None for e in problem.dataset)
-    found = settled(problem, replace(off, rivals=(off.fitted, rival)))
+    found = refined_under_scatter(problem, replace(off, rivals=(off.fitted, rival)))
     assert found.fitted.x[0] == pytest.approx(0.6, abs=2e-3)
     assert found.rivals[0] is found.fitted
     assert found.rivals[1] is rival

@@ -58,14 +58,14 @@ def test_the_last_effect_is_searched_anew_beside_variants(
         found = of(*kept, answers[first.id])
         return Step(base=of(*kept), fitted=found, p_value=0.0, rivals=(found,))
 
-    monkeypatch.setattr(decision, "swapped", swapped)
+    monkeypatch.setattr(decision, "with_first_replaced", swapped)
     monkeypatch.setattr(decision, "backward_elimination", lambda _, f, *__: f)
     problem = SimpleNamespace(again=lambda f: f, effort=SETTINGS.forward.drops)
     taken = [
         Step(base=of(), fitted=of(beside), p_value=0.0),
         Step(base=of(beside), fitted=of(held, CRUST), p_value=0.0),
     ]
-    parts = decision._retained(cast(Inquiry, SimpleNamespace(problem=problem)), taken)
+    parts = decision._needed_steps(cast(Inquiry, SimpleNamespace(problem=problem)), taken)
     assert parts is not None
     assert looked == asked
     assert {c.id for c in parts[-1].fitted.candidates} == {"soil-layer", answers.get("soil-crust", CRUST)[0]}
@@ -93,7 +93,7 @@ def test_full_runs_keep_sure_effects_and_reuse_the_last_fit(
         assert no_jacobian == effort.is_ensemble
         return left(of(CRUST), 9.0 - k)
 
-    monkeypatch.setattr(decision, "without", without)
+    monkeypatch.setattr(decision, "without_effect", without)
     monkeypatch.setattr(decision, "significant_by_wald", lambda *_: surely)
     base, held = left(of(beside), 8.0), left(of(("soil-layer", ("a",)), CRUST), 1.0)
     problem = cast(Any, SimpleNamespace(again=lambda f: f, effort=effort))
@@ -118,7 +118,7 @@ def test_the_strongest_is_that_without_which_most_is_left(monkeypatch: pytest.Mo
         return {"soil-layer": 3.0, "soil-crust": None}[candidates[0].id]  # without the layer no run is to be had
 
     monkeypatch.setattr(decision, "left_at", left_at)
-    monkeypatch.setattr(decision, "without", lambda _, f, k, rounds: left(of(CRUST), 2.0 - k))
+    monkeypatch.setattr(decision, "without_effect", lambda _, f, k, rounds: left(of(CRUST), 2.0 - k))
     problem = cast(Any, SimpleNamespace(effort=effort))
     held = replace(left(of(LAYER, CRUST), 1.0), x=(0.1, 0.2, 0.3, 0.4))
     assert decision.strongest(problem, left(of(), 9.0), held).id == "soil-layer"
@@ -127,7 +127,7 @@ def test_the_strongest_is_that_without_which_most_is_left(monkeypatch: pytest.Mo
 
 def test_what_is_not_needed_goes_and_the_rest_has_slopes_again(monkeypatch: pytest.MonkeyPatch) -> None:
     rest, again = left(of(LAYER), 1.0), left(of(LAYER), 1.0)
-    monkeypatch.setattr(decision, "without", lambda *_, **__: rest)
+    monkeypatch.setattr(decision, "without_effect", lambda *_, **__: rest)
     monkeypatch.setattr(decision, "significant_by_wald", lambda *_: {0})
     for effort, found in ((SETTINGS.forward.runs, again), (SETTINGS.forward.drops, rest)):
         problem = cast(Any, SimpleNamespace(again=lambda f: again if f is rest else f, effort=effort))
@@ -167,7 +167,7 @@ def test_a_full_set_swapped_again_and_again_is_no_answer(
         left = [(c.id, tuple(c.search)) for c in f.candidates if len(looked) < 2 or c.id != needless]
         return of(*left)
 
-    monkeypatch.setattr(decision, "swapped", swapped)
+    monkeypatch.setattr(decision, "with_first_replaced", swapped)
     monkeypatch.setattr(decision, "backward_elimination", backward_elimination)
     problem = SimpleNamespace(again=lambda f: f, effort=SETTINGS.forward.drops)
     order = (LAYER, CRUST, MASS)
@@ -175,7 +175,7 @@ def test_a_full_set_swapped_again_and_again_is_no_answer(
         Step(base=of(*order[:k]), fitted=of(*order[: k + 1]), p_value=0.0)
         for k in range(SETTINGS.selection.flexibility.most_effects)
     ]
-    parts = decision._retained(cast(Inquiry, SimpleNamespace(problem=problem)), taken)
+    parts = decision._needed_steps(cast(Inquiry, SimpleNamespace(problem=problem)), taken)
     assert looked == asked
     assert (None if parts is None else {c.id for c in parts[-1].fitted.candidates}) == found
 
@@ -200,7 +200,7 @@ def test_effects_that_will_be_refused_are_not_looked_for_anew(
     monkeypatch.setattr(decision, "backward_elimination", lambda *_: of(LAYER, CRUST) if needless else held)
     problem = cast(Any, SimpleNamespace(again=lambda f: f, effort=SETTINGS.forward.drops))
     left = cast(Any, SimpleNamespace(p_value=p_value))
-    assert decision.is_open_to_be_named(problem, fitted, left) == is_open
+    assert decision.may_be_named(problem, fitted, left) == is_open
 
 
 @pytest.mark.parametrize(
@@ -228,11 +228,11 @@ def test_a_set_that_was_swapped_has_a_step_for_each_member(
         Step(base=of(CRUST), fitted=of(CRUST, LAYER), p_value=0.0),
     ]
     ended = Step(base=of(LAYER), fitted=both, p_value=0.0, rivals=(both,))
-    monkeypatch.setattr(decision, "swapped", swapped)
-    monkeypatch.setattr(decision, "_retained", lambda *_: retained)
+    monkeypatch.setattr(decision, "with_first_replaced", swapped)
+    monkeypatch.setattr(decision, "_needed_steps", lambda *_: retained)
     monkeypatch.setattr(decision, "followed", lambda *_: (ended, None))
     problem = SimpleNamespace(again=lambda f: f, effort=SETTINGS.forward.drops)
-    parts = decision._ended(cast(Inquiry, SimpleNamespace(problem=problem)), retained)
+    parts = decision._fully_fitted_steps(cast(Inquiry, SimpleNamespace(problem=problem)), retained)
     assert parts is not None
     assert [s.fitted.candidates[-1].id for s in parts] == ["soil-layer", "soil-stiffness"]
     assert parts[-1].fitted is both

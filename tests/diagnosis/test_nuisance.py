@@ -11,7 +11,7 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.condition_uncertainty import doubts, marginalised
-from rollover.diagnosis.data.dataset import Dataset, dataset_of, doubted, groups_of, left_out
+from rollover.diagnosis.data.dataset import Dataset, condition_groups, dataset_of, left_out, with_uncertain_conditions
 from rollover.diagnosis.data.repeatability import with_scatter
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import coordinate
@@ -44,7 +44,7 @@ def dataset(recordings: list[tuple[str, Recording]]) -> list[Dataset]:
     for name, r in recordings:
         one = dataset_of(name, r, simulator_of(scenario(), r))
         assert one is not None
-        found.append(doubted(one, set_up(scenario(), r)))
+        found.append(with_uncertain_conditions(one, set_up(scenario(), r)))
     return found
 
 
@@ -126,7 +126,7 @@ def test_repeats_with_shifted_clocks_do_not_differ_by_jumps() -> None:
 
 def test_recordings_of_one_condition_are_left_out_one_by_one() -> None:
     found = dataset([*recorded({}, 1, speeds=(2.0,)), *recorded({}, 2, speeds=(2.0,))])
-    assert groups_of(found) == [[0, 1]]
+    assert condition_groups(found) == [[0, 1]]
     assert left_out(found) == [[0], [1]]
     assert left_out(dataset(recorded({}, 1, speeds=(2.0, 3.0)))) == [[0], [1]]
 

@@ -68,7 +68,7 @@ def test_p_values_are_uniform_where_there_is_only_noise(memory: float) -> None:
             np.concatenate([s.values - r.channels[s.channel][s.rows] for s in e.signals])
             for e, (r, _) in zip(dataset, drops, strict=True)
         ]
-        problem = Problem(autoregression.whole(dataset, misfit))
+        problem = Problem(autoregression.with_noise_of_residuals(dataset, misfit))
         base = problem.fit((), (), rounds=1)
         assert base is not None
         phases = [drop_phases(e) for e in problem.dataset]
@@ -104,7 +104,9 @@ def test_noise_memory_is_unbiased_though_levels_differ() -> None:
             np.concatenate([span * noise(rng, s.rows.size, 0.8) for s, span in zip(e.signals, spans, strict=True)])
             for e in dataset
         ]
-        told = autoregression.whole(autoregression.quiet(dataset, misfit), misfit)
+        told = autoregression.with_noise_of_residuals(
+            autoregression.with_noise_of_quiet_stretches(dataset, misfit), misfit
+        )
         found += [sum(s.ar) for s in told[0].signals]
     assert np.mean(found) == pytest.approx(0.8, abs=0.0025)
 
@@ -146,7 +148,7 @@ def test_after_a_blow_nothing_is_quiet() -> None:
     for e in dataset:
         each = [np.where(e.recording.time[s.rows] < 0.1, 1.0, 3.0) * spans[s.channel] for s in e.signals]
         misfit.append(np.concatenate([size * rng.standard_normal(size.size) for size in each]))
-    for e in autoregression.quiet(dataset, misfit):
+    for e in autoregression.with_noise_of_quiet_stretches(dataset, misfit):
         for s in e.signals:
             assert s.noise == pytest.approx(spans[s.channel], rel=0.15), s.channel
 
@@ -155,7 +157,7 @@ def test_quiet_noise_is_found_beneath_a_large_misfit() -> None:
     rng, drops = np.random.default_rng(13), silent()
     dataset = noisy(drops, rng, 0.0)
     off = [np.concatenate([0.7 * s.values for s in e.signals]) for e in dataset]  # a scenario that says a third
-    for e, before in zip(autoregression.quiet(dataset, off), dataset, strict=True):
+    for e, before in zip(autoregression.with_noise_of_quiet_stretches(dataset, off), dataset, strict=True):
         for s, b in zip(e.signals, before.signals, strict=True):
             true = 0.01 * float(np.ptp(b.values))
             assert 0.6 * true < s.noise < 2.0 * true, s.channel

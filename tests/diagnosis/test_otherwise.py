@@ -18,8 +18,8 @@ from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.forward_step import _from_base
-from rollover.diagnosis.selection.restarts import begun_otherwise, clocked_alike
+from rollover.diagnosis.selection.forward_step import _restarted_from_base
+from rollover.diagnosis.selection.restarts import begun_otherwise, with_common_time_shifts
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far, screen
 from rollover.diagnosis.settings import SETTINGS
@@ -134,8 +134,8 @@ def test_a_time_shift_is_that_of_the_lowest_minimum() -> None:
         return [work(problem, task) for task in tasks]
 
     inquiry = cast(Inquiry, SimpleNamespace(problem=problem, fits=fits))
-    assert clocked_alike(inquiry, []) == []  # nothing is near where each leaves more than the base
-    kept, moved, same = clocked_alike(inquiry, [lead, late, alike])
+    assert with_common_time_shifts(inquiry, []) == []  # nothing is near where each leaves more than the base
+    kept, moved, same = with_common_time_shifts(inquiry, [lead, late, alike])
     assert kept is lead
     assert same is alike
     assert [(task.how, task.shifts) for task in asked] == [("time", tuple(problem.shifts))]
@@ -168,6 +168,6 @@ def test_a_misled_fit_restarts_and_goes_on_if_it_soon_gains() -> None:
     problem = SimpleNamespace(again=lambda f: f)
     inquiry = cast(Inquiry, SimpleNamespace(fits=fits, problem=problem))
     looked = ScoreTest(score=1.0, scores={}, null=np.zeros(1), detectable={}, starts={"inertia": ((0.7,),)})
-    found = _from_base(inquiry, base, [fitted("slope", 200.0, (0.5, 0.2)), *astray], looked)
+    found = _restarted_from_base(inquiry, base, [fitted("slope", 200.0, (0.5, 0.2)), *astray], looked)
     assert [(f.candidates[-1].id, f.left) for f in found] == [("inertia", 250.0), ("air-drag", 310.0)]
     assert [j.start for j in asked] == [(0.5, 0.7), (0.5, 0.8), (0.5, 0.7)]

@@ -13,7 +13,7 @@ from rollover.comparison.instruments import at_sensor
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import phases_of as phases
 from rollover.diagnosis.fit import cache
-from rollover.diagnosis.fit.ensemble_mean import left_of_means, rescattered
+from rollover.diagnosis.fit.ensemble_mean import ensemble_mean_misfit, with_ensemble_scatter
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.forward import full_run
 from rollover.diagnosis.forward.forward_model import DropSimulator, simulator_of
@@ -254,8 +254,8 @@ def test_scatter_is_asked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     nothing = problem.fit((), (), rounds=0)
     assert nothing is not None
     made.clear()
-    rescattered(problem, nothing, 4)
-    left_of_means(problem, nothing)
+    with_ensemble_scatter(problem, nothing, 4)
+    ensemble_mean_misfit(problem, nothing)
     assert [n for n in made if n > 1] == 2 * [1 + len(SETTINGS.forward.run.perturbations)]
 
 

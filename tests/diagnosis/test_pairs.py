@@ -14,7 +14,7 @@ from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.fit.step import Screened, Step
-from rollover.diagnosis.fit.threshold_scan import has_threshold, placed_beside
+from rollover.diagnosis.fit.threshold_scan import has_threshold, threshold_starts
 from rollover.diagnosis.selection import pairs
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
@@ -217,7 +217,7 @@ def test_a_threshold_starts_where_it_helps_beside_the_other(ratio: float, lost: 
     alone = problem.fit((layer,), (0.3, 0.5), shifts=shifts, fixed_shifts=True)
     assert hardening is not None
     assert alone is not None
-    begun = placed_beside(problem, (rate, hardening.x, layer), few=few, shifts=shifts)
+    begun = threshold_starts(problem, (rate, hardening.x, layer), few=few, shifts=shifts)
     assert begun is not None
     assert begun[:1] == hardening.x
     assert begun[1] == pytest.approx(coordinate(DEPTH, layer.search["depth"]), abs=0.1)
@@ -234,7 +234,7 @@ def test_the_scan_point_of_least_misfit_beside_it_is_taken() -> None:
     shallow = 0.07
     problem = layered(0.7, shallow)
     rate, layer = candidate(problem, "soil-rate-hardening"), candidate(problem, "soil-layer")
-    begun = placed_beside(problem, (rate, (0.1,), layer), few=[0, 1, 2], shifts=[0.0] * 3)
+    begun = threshold_starts(problem, (rate, (0.1,), layer), few=[0, 1, 2], shifts=[0.0] * 3)
     assert begun is not None
     assert begun[1] == pytest.approx(coordinate(shallow, layer.search["depth"]), abs=0.1)
 
@@ -258,7 +258,7 @@ def test_leaders_and_thresholds_are_scanned_in_pairs(monkeypatch: pytest.MonkeyP
         return [None, *((*x, 0.8, 0.9) for _, x, _ in ways[1:])]
 
     asking = cast(Inquiry, SimpleNamespace(parallel_map=parallel_map))
-    found = pairs._placed_anew(asking, partners, [0, 2], [1e-3, 0.0, 0.0])
+    found = pairs._with_thresholds_scanned(asking, partners, [0, 2], [1e-3, 0.0, 0.0])
     ways = [
         ("mass", (0.1,), "soil-layer"),
         ("soil-viscous-damping", (0.2,), "soil-layer"),
@@ -330,7 +330,7 @@ def test_three_become_two_only_where_the_third_is_not_needed(
     monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
     monkeypatch.setattr(pairs, "followed", lambda _, one: (one, SimpleNamespace(p_value=1e-6)))
     monkeypatch.setattr(pairs, "is_enough", lambda *_: False)
-    monkeypatch.setattr(pairs, "reweighted", lambda *_: True)
+    monkeypatch.setattr(pairs, "with_noise_of_fit", lambda *_: True)
     monkeypatch.setattr(pairs, "mismatch_of", lambda *_: SimpleNamespace(p_value=0.4))
     both = pairs.best_subsets(inquiry([]), [found], cast(ScoreTest, None), fitted((MASS,), 1.0), is_whole=True)
     assert (both is not None) == taken
@@ -360,7 +360,7 @@ def test_a_pair_that_leaves_nearly_noise_tells_of_it(
     monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
     monkeypatch.setattr(pairs, "followed", lambda _, one: (one, SimpleNamespace(p_value=p_value)))
     monkeypatch.setattr(pairs, "is_enough", lambda _judge, _fit, left: left.p_value > 0.001)
-    monkeypatch.setattr(pairs, "reweighted", with_noise_model)
+    monkeypatch.setattr(pairs, "with_noise_of_fit", with_noise_model)
     monkeypatch.setattr(pairs, "mismatch_of", lambda *_: SimpleNamespace(p_value=0.4))
     asking = inquiry([])
     asking.problem.dataset, asking.problem.with_noise_model = ("quiet",), reweighted.append  # type: ignore[assignment,method-assign]

@@ -22,7 +22,7 @@ from rollover.diagnosis.planning.plan import plan, usual_noise
 from rollover.diagnosis.planning.planned import Instruments, coloured, only, planned
 from rollover.diagnosis.planning.separation import Tests as PlannedTests
 from rollover.diagnosis.planning.strength import place_where_it_acts, strength_with
-from rollover.diagnosis.prepared import prepared, trusted
+from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
@@ -244,7 +244,7 @@ def test_a_diagnosis_asks_for_the_drop_where_its_fits_differ() -> None:
     """Hardening beside stiffness after drops at 2 and 3 m/s: a drop far slower tells, and a repeat does not."""
     changes = {"effects.soil-rate-hardening.per_decade": 0.02}
     made = recorded(changes, 1, speeds=(2.0, 3.0))
-    dataset = trusted(scenario(), prepared(scenario(), made, Executor())[0])
+    dataset = weighted_datasets(scenario(), prepared(scenario(), made, Executor())[0])
     known, problem = effects_of(dataset), Problem(dataset)
     hardening, stiffness = known["soil-rate-hardening"], known["soil-stiffness"]
     one = problem.fit((hardening,), at(hardening, per_decade=0.02))

@@ -12,12 +12,12 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import Dataset, dataset_of
-from rollover.diagnosis.data.quantisation import digitised, resolution, without_spikes
+from rollover.diagnosis.data.quantisation import resolution, with_quantisation, without_spikes
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, turned
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, first_effect_last
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.forward.forward_model import simulator_of
-from rollover.diagnosis.selection.forward_step import moves
+from rollover.diagnosis.selection.forward_step import largest_change
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, linear_blocks, recorded, scenario, signal
@@ -63,7 +63,7 @@ def test_noise_makes_the_rounding_of_each_sample_its_own(noise: float, shared: f
     rough = replace(r, channels={**r.channels, FORCE: np.round(noisy / step) * step})
     total = step * float(np.sqrt(noise**2 + 1.0 / 12.0))
     told = replace(one, signals=tuple(replace(s, noise=total) for s in one.signals))
-    force = next(s for s in digitised([told], [rough])[0].signals if s.channel == FORCE)
+    force = next(s for s in with_quantisation([told], [rough])[0].signals if s.channel == FORCE)
     assert force.scatter == pytest.approx(shared * step, rel=1e-6)
 
 
@@ -78,9 +78,9 @@ def test_a_digit_flipping_at_an_edge_is_no_noise() -> None:
     def seen(noise: float) -> Dataset:
         return replace(one, signals=tuple(replace(s, noise=noise * step) for s in one.signals))
 
-    both = digitised([seen(0.0), seen(0.5)], [rough, rough])
+    both = with_quantisation([seen(0.0), seen(0.5)], [rough, rough])
     assert [s.scatter for e in both for s in e.signals if s.channel == FORCE] == pytest.approx([0.5 * step] * 2)
-    (alone,) = digitised([seen(0.5)], [rough])
+    (alone,) = with_quantisation([seen(0.5)], [rough])
     assert next(s for s in alone.signals if s.channel == FORCE).scatter < 0.1 * step
 
 
@@ -127,7 +127,7 @@ def test_a_fit_with_its_first_effect_last_is_the_same_fit() -> None:
     two = Candidate(id="soil-layer", kind="physics", family="", search={"a": Search(0, 1), "b": Search(0, 1)})
     one = Candidate(id="mass", kind="parameter", family="", search={"c": Search(0, 1)}, channel=DEPTH)
     fitted = Fitted(candidates=(two, one), x=(0.1, 0.2, 0.3), blocks=tuple(linear_blocks(rng, 3, 40, truth)))
-    other = turned(fitted)
+    other = first_effect_last(fitted)
     assert [c.id for c in other.candidates] == ["mass", "soil-layer"]
     assert other.x == (0.3, 0.1, 0.2)
     assert np.array_equal(other.blocks[1].J[:, 0], fitted.blocks[1].J[:, 2])
@@ -149,4 +149,4 @@ def test_within_half_a_step_of_its_digits_nothing_has_moved() -> None:
             for off in (share, 0.0)
         ]
         base, fitted = (Fitted(candidates=(), x=(), blocks=(b,)) for b in blocks)
-        assert moves(problem, base, fitted) == pytest.approx(told)
+        assert largest_change(problem, base, fitted) == pytest.approx(told)

@@ -17,11 +17,11 @@ from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit import levenberg_marquardt, local_search, threshold_scan
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.local_search import ended, timed
-from rollover.diagnosis.fit.model_variants import shaped
+from rollover.diagnosis.fit.local_search import ended, with_time_shift_search
+from rollover.diagnosis.fit.model_variants import with_fitted_shape
 from rollover.diagnosis.fit.parameterisation import coordinate, coordinates
 from rollover.diagnosis.fit.step import Screened, Step
-from rollover.diagnosis.fit.threshold_scan import stretches, traced
+from rollover.diagnosis.fit.threshold_scan import threshold_ranges, with_threshold_traced
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.inference.intervals import intervals
@@ -29,7 +29,7 @@ from rollover.diagnosis.selection import restarts
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.pairs import best_subsets
-from rollover.diagnosis.selection.restarts import _combed
+from rollover.diagnosis.selection.restarts import _damping_frequency_scan
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.simulate import run
@@ -69,7 +69,7 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
         executor=Executor(),
     )
     looked = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
-    (found,) = _combed(inquiry, [led_astray], looked, [b.shift for b in led_astray.blocks])
+    (found,) = _damping_frequency_scan(inquiry, [led_astray], looked, [b.shift for b in led_astray.blocks])
     assert found.left < 1.2 * count
     assert c.values(found.x)["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
     assert c.values(found.x)["damping"] == pytest.approx(true["damping"], rel=0.1)
@@ -93,11 +93,11 @@ def test_a_misfitted_nose_is_found_by_its_ringing(
         problem=problem, candidates=[c], groups=[[0], [1, 2]], phases=[], say=lambda _: None, executor=Executor()
     )
     looked = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
-    (found,) = _combed(inquiry, [astray], looked, [b.shift for b in astray.blocks])
+    (found,) = _damping_frequency_scan(inquiry, [astray], looked, [b.shift for b in astray.blocks])
     assert found.left < 1.2 * sum(e.count for e in problem.dataset)
     assert found.candidates[-1].values(found.x) == pytest.approx(true, rel=0.01)
     monkeypatch.setattr(restarts, "_by_frequency", lambda *_: [])
-    (near,) = _combed(inquiry, [astray], looked, [b.shift for b in astray.blocks])
+    (near,) = _damping_frequency_scan(inquiry, [astray], looked, [b.shift for b in astray.blocks])
     assert near.left > 10.0 * found.left
 
 
@@ -111,7 +111,7 @@ def test_the_clock_of_a_channel_is_followed_against_all_others(tmp_path: Path) -
     begun = (coordinate(0.006138, c.search["offset"]),)
     stopped = problem.fit((c,), begun, shifts=[1.43e-4] * len(case.recordings), width=2)
     assert stopped is not None
-    found = timed(problem, stopped)
+    found = with_time_shift_search(problem, stopped)
     right = problem.fit((c,), (coordinate(truth["parameters"]["offset"], c.search["offset"]),), width=2)
     assert right is not None
     assert found.left < right.left + 5.0 < stopped.left - 40.0
@@ -140,7 +140,7 @@ def test_a_nose_is_found_along_the_valley_of_its_frequency(tmp_path: Path) -> No
     plain = problem.fit((c,), [coordinate(share[name], s) for name, s in c.search.items()])
     assert plain is not None
     assert plain.left > 4.0 * sum(e.count for e in problem.dataset)
-    found = shaped(problem, plain, [b.total for b in plain.blocks])
+    found = with_fitted_shape(problem, plain, [b.total for b in plain.blocks])
     assert found is not None
     assert found.left < 1.1 * sum(e.count for e in problem.dataset)
     assert found.candidates[-1].along == ()
@@ -178,7 +178,7 @@ def test_the_share_of_an_unweighed_nose_is_found() -> None:
     plain = problem.fit((c,), begun, shifts=[0.0] * 3)
     assert plain is not None
     assert plain.left > 2.0 * count
-    found = shaped(problem, plain, [b.total for b in plain.blocks])
+    found = with_fitted_shape(problem, plain, [b.total for b in plain.blocks])
     assert found is not None
     assert found.left < 1.1 * count
     told = found.candidates[-1].values(found.x)
@@ -198,11 +198,11 @@ def test_a_threshold_is_found_though_a_fit_ended_at_another() -> None:
     ended = problem.fit((c,), begun, width=1)
     assert ended is not None
     assert abs(c.values(ended.x)["thickness"] - true["thickness"]) > 0.004
-    found = min((traced(problem, ended, s) for s in stretches(ended)), key=lambda f: f.left)
+    found = min((with_threshold_traced(problem, ended, s) for s in threshold_ranges(ended)), key=lambda f: f.left)
     assert found.left < ended.left - 100.0
     assert c.values(found.x)["thickness"] == pytest.approx(true["thickness"], rel=0.01)
     assert c.values(found.x)["stiffness_ratio"] == pytest.approx(true["stiffness_ratio"], abs=0.001)
-    assert all(traced(problem, found, s).left <= found.left for s in stretches(found))
+    assert all(with_threshold_traced(problem, found, s).left <= found.left for s in threshold_ranges(found))
 
 
 def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
@@ -214,7 +214,7 @@ def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
     c = candidate(problem, f"sensor-clock-drift:{FORCE}")
     stopped = problem.fit((c,), (coordinate(truth["parameters"]["drift"] / 6.0, c.search["drift"]),), rounds=0)
     assert stopped is not None
-    found = min((traced(problem, stopped, s) for s in stretches(stopped)), key=lambda f: f.left)
+    found = min((with_threshold_traced(problem, stopped, s) for s in threshold_ranges(stopped)), key=lambda f: f.left)
     assert found.left < 0.9 * stopped.left
     assert c.values(found.x)["drift"] == pytest.approx(truth["parameters"]["drift"], rel=0.02)
 
@@ -229,8 +229,8 @@ def test_what_rings_is_traced_along_the_valley_of_its_frequency(tmp_path: Path) 
     assert stopped is not None
     bent, own = c.bent(x)
     assert bent.plain(own)[1] == pytest.approx(x)
-    assert [k for k, _, _ in stretches(stopped)] == [2, 2]
-    found = min((traced(problem, stopped, s) for s in stretches(stopped)), key=lambda f: f.left)
+    assert [k for k, _, _ in threshold_ranges(stopped)] == [2, 2]
+    found = min((with_threshold_traced(problem, stopped, s) for s in threshold_ranges(stopped)), key=lambda f: f.left)
     assert found.left < stopped.left - 20.0
     share = case.truth["effects"][0]["parameters"]["nose_share"]
     assert c.values(found.x)["nose_share"] == pytest.approx(share, rel=0.006)
@@ -280,7 +280,7 @@ def test_an_abrupt_effect_is_led_by_its_smooth_shape(tmp_path: Path) -> None:
     for begun in ((0.8125, 0.875), (0.0625, 0.125)):
         stuck = problem.fit((c,), begun)
         assert stuck is not None
-        found = shaped(problem, stuck, [b.total for b in stuck.blocks])
+        found = with_fitted_shape(problem, stuck, [b.total for b in stuck.blocks])
         assert found is not None
         assert found.candidates == (c,), "its usual shape"
         gains.append(stuck.left - found.left)
@@ -356,7 +356,7 @@ def test_a_start_that_soon_beats_the_fit_goes_on() -> None:
         return None if left is None else SimpleNamespace(x=(x[0] + 0.01,), total=left)
 
     problem = cast(Problem, SimpleNamespace(fit=short))
-    found = threshold_scan._soonest(problem, fitted, [(0.1,), (0.2,), (0.3,), (0.4,)], (0, 2))
+    found = threshold_scan._best_start(problem, fitted, [(0.1,), (0.2,), (0.3,), (0.4,)], (0, 2))
     assert [round(x, 9) for (x,) in found] == [0.21, 0.41]
     assert asked == 5 * [(0, 2)]
 

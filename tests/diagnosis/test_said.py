@@ -15,7 +15,7 @@ from rollover.diagnosis.data.phases import drop_phases
 from rollover.diagnosis.fit.cross_validation import Held
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.forward.forward_model import simulator_of
-from rollover.diagnosis.inference.scores import before_an_impact
+from rollover.diagnosis.inference.scores import misfit_before_impact
 from rollover.diagnosis.noise.ensemble import HeavyTail
 from rollover.diagnosis.result import Interval, Named
 from rollover.diagnosis.sensors_first import in_words
@@ -73,10 +73,10 @@ def test_what_runs_that_scatter_miss_is_told_before_the_blow_too() -> None:
     )
     fitted = Fitted(candidates=(), x=(), blocks=blocks)
     scattering: Any = [SimpleNamespace(expected=50.0, early=early), SimpleNamespace(expected=None, early=early)]
-    assert before_an_impact(scattering, fitted) == pytest.approx(np.sqrt(12.5))
-    assert before_an_impact(scattering[1:], fitted) is None  # a drop
+    assert misfit_before_impact(scattering, fitted) == pytest.approx(np.sqrt(12.5))
+    assert misfit_before_impact(scattering[1:], fitted) is None  # a drop
     at_once: Any = [SimpleNamespace(expected=50.0, early=~(early | ~early))] * 2
-    assert before_an_impact(at_once, fitted) is None
+    assert misfit_before_impact(at_once, fitted) is None
 
 
 @pytest.mark.parametrize(("told", "said"), [(11, None), (12, 3.0)])
@@ -87,7 +87,7 @@ def test_of_few_samples_before_the_blow_nothing_is_said(told: int, said: float |
     none: Any = {"J": np.zeros((80, 0)), "slope": np.zeros(80), "shift": 0.0, "prior": 1e-3}
     fitted = Fitted(candidates=(), x=(), blocks=(ResidualBlock(residual=residual, **none),) * 2)
     scattering: Any = [SimpleNamespace(expected=50.0, early=early)] * 2
-    assert before_an_impact(scattering, fitted) == said
+    assert misfit_before_impact(scattering, fitted) == said
 
 
 def test_a_misfit_with_scatter_or_a_remainder_is_reported() -> None:
@@ -117,13 +117,15 @@ def test_an_effect_whose_numbers_may_all_be_null_may_be_nothing() -> None:
             indistinguishable_from=(), discriminating_test="",
         )  # fmt: skip
 
-    assert statements.is_none(effect("impact-speed", scale=(0.98, 1.09)))
-    assert not statements.is_none(effect("impact-speed", scale=(1.01, 1.09)))
-    assert statements.is_none(effect("centre-of-mass", height=(-0.1, 0.1), lateral=(-0.2, 0.1)))
-    assert statements.is_none(effect("soil-adhesion", stress=(0.8, 8800.0), reach=(1e-3, 0.1)))  # a hundredth of it
-    assert not statements.is_none(effect("soil-adhesion", stress=(30.0, 240.0), reach=(1e-3, 0.1)))
-    assert not statements.is_none(effect("centre-of-mass", height=(-0.1, 0.1), lateral=(0.02, 0.1)))
-    assert not statements.is_none(effect("rops-plasticity", yield_force=(-1.0, 1e6)))  # a limit has no null
+    assert statements.is_null_effect(effect("impact-speed", scale=(0.98, 1.09)))
+    assert not statements.is_null_effect(effect("impact-speed", scale=(1.01, 1.09)))
+    assert statements.is_null_effect(effect("centre-of-mass", height=(-0.1, 0.1), lateral=(-0.2, 0.1)))
+    assert statements.is_null_effect(
+        effect("soil-adhesion", stress=(0.8, 8800.0), reach=(1e-3, 0.1))
+    )  # a hundredth of it
+    assert not statements.is_null_effect(effect("soil-adhesion", stress=(30.0, 240.0), reach=(1e-3, 0.1)))
+    assert not statements.is_null_effect(effect("centre-of-mass", height=(-0.1, 0.1), lateral=(0.02, 0.1)))
+    assert not statements.is_null_effect(effect("rops-plasticity", yield_force=(-1.0, 1e6)))  # a limit has no null
     # an overturn without anything in it had named this, on what its runs make of chance
     growth, faster = effect("soil-added-mass-growth", rate=(0.12, 2118.0)), effect("impact-speed", scale=(1.01, 1.09))
     assert statements.interval_contains_null([growth], True) == {"soil-added-mass-growth"}
@@ -150,7 +152,7 @@ def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest
         base=None,
         parts=[SimpleNamespace(fitted=fit(i), p_value=0.0) for i in ("soil-stiffness", "inertia")],
     )
-    monkeypatch.setattr(statements, "in_shorter_steps", lambda _, fitted: fitted)
+    monkeypatch.setattr(statements, "refined_by_ensemble_mean", lambda _, fitted: fitted)
     monkeypatch.setattr(statements, "intervals", lambda *_, **__: told)
     monkeypatch.setattr(statements, "confusion", lambda *_: [fit("soil-stiffness"), fit("inertia"), fit("soil-crust")])
     monkeypatch.setattr(

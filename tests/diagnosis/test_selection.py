@@ -19,7 +19,7 @@ from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.selection import decision, forward_step, pairs, stepwise
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.decision import Explanation, by_the_first, decided
+from rollover.diagnosis.selection.decision import Explanation, by_first_effect, verdict_on
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
@@ -83,7 +83,7 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
 def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
     count: int, p_value: float, named: int, judged: dict[str, float]
 ) -> None:
-    found, verdict = decided(
+    found, verdict = verdict_on(
         cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(count, p_value), [], []
     )
     assert len(found.parts) == named
@@ -91,16 +91,14 @@ def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
 
 
 @pytest.mark.parametrize(("local", "named"), [(0.5, SETTINGS.selection.flexibility.most_effects), (1e-5, 0)])
-def test_flexible_effects_must_leave_no_single_place(
-    local: float, named: int, judged: dict[str, float]
-) -> None:
+def test_flexible_effects_must_leave_no_single_place(local: float, named: int, judged: dict[str, float]) -> None:
     """All places together hide one: chi-square of 960 takes no note of 50 beyond the 12 of one."""
     found = explanation(SETTINGS.selection.flexibility.most_effects, 0.4)
     found = replace(found, after=replace(found.after, adjusted=(0.9, local)))
     problem = cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops))
-    assert len(decided(problem, found, [], [])[0].parts) == named
+    assert len(verdict_on(problem, found, [], [])[0].parts) == named
     fewer = explanation(2, 0.4)
-    assert len(decided(problem, replace(fewer, after=found.after), [], [])[0].parts) == 2
+    assert len(verdict_on(problem, replace(fewer, after=found.after), [], [])[0].parts) == 2
 
 
 @pytest.mark.parametrize(
@@ -110,10 +108,10 @@ def test_flexible_effects_must_leave_no_single_place(
 def test_what_a_slight_effect_explains_whole_is_no_mismatch(
     moved: float, remaining: float, verdict: str, judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(decision, "moves", lambda *_: moved)
+    monkeypatch.setattr(decision, "largest_change", lambda *_: moved)
     monkeypatch.setattr(decision, "mismatch_of", lambda *_: left(remaining))
     one = explanation(1, 1e-9)
-    found = decided(
+    found = verdict_on(
         cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)),
         replace(one, parts=(), fitted=one.base),
         [],
@@ -127,9 +125,9 @@ def test_the_gain_of_an_effect_that_may_be_null_tells_nothing() -> None:
     problem = cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops))
     one, two = (replace(explanation(count, 0.4), before=left(0.2)) for count in (1, 2))
     assert one.p_value < 1e-6  # of 99 that the best candidate scores
-    refused = by_the_first(problem, one, {IDS[0]}, [])
+    refused = by_first_effect(problem, one, {IDS[0]}, [])
     assert (refused.parts, refused.fitted, refused.p_value) == ((), one.base, 0.2)
-    assert by_the_first(problem, two, {IDS[0]}, []).p_value == two.p_value
+    assert by_first_effect(problem, two, {IDS[0]}, []).p_value == two.p_value
 
 
 @pytest.mark.parametrize(("second_order", "offset", "done"), [(0.0, -4e-4, False), (0.25, 0.0, True)])
@@ -153,14 +151,14 @@ def test_a_maybe_null_effect_is_dropped_if_another_does_its_work(
     fitted = problem.fit(both, (*both[0].starts()[0], 0.5))
     assert fitted is not None
     problem.with_noise_model(
-        autoregression.whole(problem.dataset, problem.residuals(fitted))
+        autoregression.with_noise_of_residuals(problem.dataset, problem.residuals(fitted))
     )  # by what is left, as a step is
     found: Any = SimpleNamespace(fitted=problem.again(fitted))
     doubtful = {"sensor-clock-offset"}
-    assert decision.done_by_others(problem, found, doubtful) == (doubtful if done else set())
-    assert decision.done_by_others(problem, found, set()) == set()
+    assert decision.redundant_effects(problem, found, doubtful) == (doubtful if done else set())
+    assert decision.redundant_effects(problem, found, set()) == set()
     monkeypatch.setattr(Problem, "samples_per_error", 1e6)
-    assert decision.done_by_others(problem, found, doubtful) == doubtful
+    assert decision.redundant_effects(problem, found, doubtful) == doubtful
 
 
 @pytest.mark.parametrize(("channels", "named"), [(("a", "a"), 0), (("a", "b"), 2), ((None, None), 2), ((None, "a"), 2)])
@@ -171,7 +169,7 @@ def test_two_of_one_sensor_must_leave_what_chance_leaves(
     candidates = tuple(replace(c, channel=k) for c, k in zip(found.fitted.candidates, channels, strict=True))
     found = replace(found, fitted=replace(found.fitted, candidates=candidates))
     problem: Any = SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)
-    assert len(decided(problem, found, [], [])[0].parts) == named
+    assert len(verdict_on(problem, found, [], [])[0].parts) == named
 
 
 @pytest.mark.parametrize(
@@ -184,7 +182,7 @@ def test_an_effect_that_takes_nearly_all_is_named(
     judged["soil-crust"] = misfit
     monkeypatch.setattr(decision, "mismatch_of", lambda *_: left(1e-9, structure))
     problem: Any = SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)
-    found, verdict = decided(problem, explanation(2, 1e-4), [], [])
+    found, verdict = verdict_on(problem, explanation(2, 1e-4), [], [])
     assert verdict == ("missing-physics" if named else "unexplained")
     if named:
         assert found.fitted.label == "soil-crust"
@@ -208,7 +206,7 @@ def test_an_effect_that_hardly_predicts_better_is_not_named(
 ) -> None:
     """Whatever it leaves of those that it was fitted to."""
     judged |= {"as it is": start, "soil-crust": ahead}
-    found, verdict = decided(
+    found, verdict = verdict_on(
         cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(1, 0.4), [], []
     )
     assert (len(found.parts), verdict) == (named, "missing-physics" if named else "unexplained")
@@ -221,7 +219,7 @@ def test_what_leaves_no_more_than_is_tolerated_is_named(
     monkeypatch.setattr(decision, "is_tolerated", lambda _, f: f.label == "soil-crust")
     for held_out, named, expected in ((1.1, 1, "missing-physics"), (3.5, 0, "unexplained")):
         judged["soil-crust"] = held_out
-        found, verdict = decided(
+        found, verdict = verdict_on(
             cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(1, 1e-9), [], []
         )
         assert (len(found.parts), verdict) == (named, expected)
@@ -232,7 +230,7 @@ def test_a_simpler_rival_that_fits_as_well_is_named_beside(
     more: float, numbers: int, named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Held out it does worse by far; to all recordings it leaves 3 (or 5) more than the best's 100, of 1000."""
-    monkeypatch.setattr(forward_step, "worse", lambda *_: (9.0, 9.0))
+    monkeypatch.setattr(forward_step, "held_out_disadvantage", lambda *_: (9.0, 9.0))
 
     def fitted(id: str, left: float, many: int) -> Fitted:
         search = {f"a{k}": Search(0, 1) for k in range(many)}
@@ -256,15 +254,15 @@ def test_condition_errors_count_where_they_leave_chance_alone(
     reweighted: list[str] = []
     found, again = step(1), step(2).fitted
     problem = cast(Problem, SimpleNamespace(dataset="as it is", with_noise_model=reweighted.append))
-    monkeypatch.setattr(stepwise, "is_doubtful", lambda _: True)
+    monkeypatch.setattr(stepwise, "has_uncertain_conditions", lambda _: True)
     monkeypatch.setattr(stepwise, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
-    monkeypatch.setattr(stepwise, "conditioned", lambda *_: again)
+    monkeypatch.setattr(stepwise, "refitted_with_conditions", lambda *_: again)
     monkeypatch.setattr(stepwise, "mismatch_of", lambda *_: left(beside))
-    after, remaining = stepwise.as_conditioned(problem, found, left(1e-9), [])
+    after, remaining = stepwise.with_conditions_refitted(problem, found, left(1e-9), [])
     assert (after.fitted is again) == taken
     assert remaining.p_value == (beside if taken else 1e-9)
     assert reweighted == ([] if taken else ["as it is"])
-    same, _ = stepwise.as_conditioned(problem, found, left(0.4), [])
+    same, _ = stepwise.with_conditions_refitted(problem, found, left(0.4), [])
     assert same is found, "nothing is left to be eased"
 
 
@@ -300,8 +298,8 @@ def test_beside_a_resonance_the_other_of_a_pair_is_refitted(
     monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
     monkeypatch.setattr(pairs, "followed", lambda _, one: (one, left(p_value)))
     monkeypatch.setattr(pairs, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
-    monkeypatch.setattr(pairs, "swapped", swapped)
-    monkeypatch.setattr(pairs, "reweighted", lambda *_: False)
+    monkeypatch.setattr(pairs, "with_first_replaced", swapped)
+    monkeypatch.setattr(pairs, "with_noise_of_fit", lambda *_: False)
     asking = cast(Inquiry, SimpleNamespace(problem=problem, phases=()))
     both = pairs.best_subsets(asking, [found], cast(ScoreTest, None), pair("mass", 1e4))
     assert both is not None
@@ -312,8 +310,8 @@ def test_beside_a_resonance_the_other_of_a_pair_is_refitted(
 def test_effects_that_may_be_any_others_are_not_named(judged: dict[str, float]) -> None:
     problem = cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops))
     found = explanation(SETTINGS.selection.flexibility.most_effects, 0.4)
-    assert len(decided(problem, found, [], [])[0].parts) == SETTINGS.selection.flexibility.most_effects
-    refused, verdict = decided(problem, replace(found, settled=False), [], [])
+    assert len(verdict_on(problem, found, [], [])[0].parts) == SETTINGS.selection.flexibility.most_effects
+    refused, verdict = verdict_on(problem, replace(found, settled=False), [], [])
     assert (refused.parts, verdict) == ((), "unexplained")
 
 
@@ -324,7 +322,7 @@ def test_effects_beside_a_curved_sensor_are_not_named_together(
     """They leave no more than chance over all, and what is looked for itself: one that takes nearly all is named."""
     monkeypatch.setattr(decision, "is_a_curve", lambda *_: True)
     judged["soil-crust"] = alone
-    found, verdict = decided(
+    found, verdict = verdict_on(
         cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(2, 0.4), [], []
     )
     assert [s.fitted.candidates[-1].id for s in found.parts] == named
@@ -341,15 +339,13 @@ def test_effects_beside_a_curved_sensor_are_not_named_together(
         (100.0, 50.0, False),
     ],
 )
-def test_no_third_effect_that_must_take_far_more_than_the_second(
-    before: float, after: float, unlikely: bool
-) -> None:
+def test_no_third_effect_that_must_take_far_more_than_the_second(before: float, after: float, unlikely: bool) -> None:
     base, current = leaving(before), leaving(after)
     last = forward_step.Step(base=base, fitted=current, p_value=0.0)
     problem = cast(Problem, SimpleNamespace(effort=SimpleNamespace(is_ensemble=False)))
-    assert stepwise.is_unlikely(problem, last, current) is unlikely
+    assert stepwise.is_third_unlikely(problem, last, current) is unlikely
     # a full run costs much, and a third is rare there
-    assert not stepwise.is_unlikely(
+    assert not stepwise.is_third_unlikely(
         cast(Problem, SimpleNamespace(effort=SimpleNamespace(is_ensemble=True))), last, current
     )
 

@@ -12,7 +12,12 @@ import pytest
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.fit import ensemble_mean
-from rollover.diagnosis.fit.ensemble_mean import along, rescattered, settled, step_of_means
+from rollover.diagnosis.fit.ensemble_mean import (
+    ensemble_mean_step,
+    projected_gradient,
+    refined_under_scatter,
+    with_ensemble_scatter,
+)
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
@@ -20,10 +25,10 @@ from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.forward import full_run
 from rollover.diagnosis.forward.full_run import CENTRE, Made, Making, RunSimulator
 from rollover.diagnosis.inference import intervals as intervals_of
-from rollover.diagnosis.inference.intervals import intervals, scattered, unshaped
+from rollover.diagnosis.inference.intervals import ensemble_variance, intervals, shape_variance
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
-from rollover.diagnosis.statements import by_steps
+from rollover.diagnosis.statements import step_error_note
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.physics.scenes import shipped
@@ -92,9 +97,9 @@ def test_a_shape_that_is_not_fitted_widens_an_interval(monkeypatch: pytest.Monke
     block = problem.block(0, (SLOPE,), (0.4,), 0.0, problem.effort.fine)
     assert block is not None
     inverse = np.linalg.inv(block.J.T @ block.J)
-    found = unshaped(problem, Fitted(candidates=(alone,), x=(0.4,), blocks=(block,)), inverse)
+    found = shape_variance(problem, Fitted(candidates=(alone,), x=(0.4,), blocks=(block,)), inverse)
     assert found[0] == pytest.approx(1.0 / 12.0, rel=0.05)
-    assert unshaped(problem, Fitted(candidates=(SLOPE,), x=(0.4,), blocks=(block,)), inverse) == 0.0
+    assert shape_variance(problem, Fitted(candidates=(SLOPE,), x=(0.4,), blocks=(block,)), inverse) == 0.0
 
 
 def test_no_neighbour_is_the_run_itself(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,8 +222,8 @@ def test_a_step_to_the_mean_of_neighbours_holds_what_it_says() -> None:
             signal = replace(one.signals[0], sigma=1.0)
             every.append(replace(one, signals=(signal,), perturbed=tuple(d[k] - d[1] for k in range(2, 8))))
         A = sum(b.J.T @ b.J for b in blocks) + SETTINGS.fit.linearisation.weak_prior * np.eye(1)
-        dx = step_of_means(every, blocks)
-        sd = np.sqrt(scattered(every, blocks, np.linalg.inv(A)))
+        dx = ensemble_mean_step(every, blocks)
+        sd = np.sqrt(ensemble_variance(every, blocks, np.linalg.inv(A)))
         inside.append(abs(dx[0]) < 1.96 * sd[0])
         plain.append(float(np.linalg.solve(A, sum(b.normal()[1] for b in blocks))[0]))
         wide.append((float(dx[0]), float(sd[0])))
@@ -233,9 +238,9 @@ def test_a_time_shift_takes_its_part_of_a_deviation() -> None:
     block = ResidualBlock(residual=np.zeros(N), J=J, slope=1e3 * slope, shift=0.0, prior=1.0)
     e = dataset(0, 0.0)
     e = replace(e, signals=(replace(e.signals[0], sigma=1.0),))
-    assert abs(along(block, e, slope)[0]) < 1e-3
+    assert abs(projected_gradient(block, e, slope)[0]) < 1e-3
     across = J[:, 0] - slope * float(slope @ J[:, 0]) / float(slope @ slope)
-    assert along(block, e, across)[0] == pytest.approx(float(J[:, 0] @ across), rel=1e-4)
+    assert projected_gradient(block, e, across)[0] == pytest.approx(float(J[:, 0] @ across), rel=1e-4)
 
 
 def test_the_scatter_is_that_of_runs_with_the_explanation() -> None:
@@ -244,7 +249,7 @@ def test_the_scatter_is_that_of_runs_with_the_explanation() -> None:
     fitted = problem.fit((SLOPE,), (0.3,), rounds=1)
     assert fitted is not None
     before = problem.dataset[0].perturbed
-    rescattered(problem, fitted)
+    with_ensemble_scatter(problem, fitted)
     after = problem.dataset[0].perturbed
     expected = problem.dataset[0].simulator.perturbed(problem.changes((SLOPE,), fitted.x), fitted.blocks[0].shift)
     np.testing.assert_array_equal(np.stack(after), np.stack([s[CHANNEL] for s in expected]))
@@ -276,7 +281,7 @@ def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.Monke
     fitted = problem.fit((SLOPE,), (0.3,))
     assert fitted is not None
     assert fitted.x[0] == pytest.approx(0.4 - LAG, abs=3e-3)
-    fine = ensemble_mean.in_shorter_steps(problem, fitted)
+    fine = ensemble_mean.refined_by_ensemble_mean(problem, fitted)
     for e in every:  # all others are run in the scenario's own
         assert (
             np.max(np.abs(np.mean([d[CHANNEL] for d in e.simulator.perturbed()], axis=0))) < 0.25 * 20.0 * LAG
@@ -311,11 +316,11 @@ def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.Monke
         assert intervals(problem, fine, None, fitted)[0]["angle"] == whole
     assert asked == [{}, {}, {0: (-1.0, 1.0)}]
     told = [cast(Any, SimpleNamespace(id="slope", parameters={"angle": i})) for i in (by_itself, whole)]
-    assert by_steps(told) == [
+    assert step_error_note(told) == [
         f"slope angle: {fine.x[0]:.4g} rad by steps of 1/4 of the scenario's, in its own {fitted.x[0]:.4g}"
     ]
     hardly = replace(whole, as_simulated=whole.value + 0.01 * (whole.high - whole.low))
-    assert by_steps([cast(Any, SimpleNamespace(id="slope", parameters={"angle": hardly}))]) == []
+    assert step_error_note([cast(Any, SimpleNamespace(id="slope", parameters={"angle": hardly}))]) == []
 
 
 def test_parameters_hold_though_runs_scatter() -> None:
@@ -333,7 +338,7 @@ def test_parameters_hold_though_runs_scatter() -> None:
         base, fitted = problem.fit((), ()), problem.fit((SLOPE,), (0.3,))
         assert base is not None
         assert fitted is not None
-        found = settled(problem, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
+        found = refined_under_scatter(problem, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
         assert found.rivals == (found.fitted,)
         interval = intervals(problem, found.fitted)[0]["angle"]
         hits.append(interval.low <= 0.37 <= interval.high)
@@ -358,9 +363,9 @@ def test_a_move_does_not_leap_to_another_course() -> None:
     problem = Problem(every)
     blocks = [problem.block(r, (SLOPE,), (0.30,), 0.0, 0.02) for r in range(4)]
     fitted = Fitted(candidates=(SLOPE,), x=(0.30,), blocks=tuple(b for b in blocks if b is not None))
-    assert fitted.x[0] + step_of_means(problem.dataset, fitted.blocks)[0] == pytest.approx(0.374, abs=0.005)
+    assert fitted.x[0] + ensemble_mean_step(problem.dataset, fitted.blocks)[0] == pytest.approx(0.374, abs=0.005)
     base = problem.fit((), ())
     assert base is not None
-    found = settled(problem, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
+    found = refined_under_scatter(problem, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
     assert not 0.365 < found.fitted.x[0] < 0.385
     assert found.fitted.left < problem.again(fitted).left

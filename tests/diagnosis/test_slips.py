@@ -12,7 +12,7 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data import inconsistent as slipping
-from rollover.diagnosis.data.inconsistent import Inconsistency, inconsistencies_of
+from rollover.diagnosis.data.inconsistent import Inconsistency, find_inconsistencies
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.prepared import prepared
 from rollover.recording import Recording
@@ -78,7 +78,7 @@ def test_without_other_recordings_it_cannot_be_distinguished() -> None:
 
 def inconsistencies(made: Drops) -> tuple[list[Inconsistency], list[Inconsistency]]:
     every, _ = prepared(scenario(), made, Executor())
-    return inconsistencies_of(every)
+    return find_inconsistencies(every)
 
 
 @pytest.mark.parametrize("factor", [0.6, 1.4, math.pi, 4.4482])
@@ -108,7 +108,7 @@ def test_what_neighbouring_runs_do_as_well_is_no_slip(apart: float, is_slip: boo
     every[1] = replace(
         every[1], simulator=SimpleNamespace(predict=every[1].simulator.predict, perturbed=lambda: perturbed)
     )
-    assert [inconsistency.signal.channel for inconsistency in inconsistencies_of(every)[0]] == [FORCE] * is_slip
+    assert [inconsistency.signal.channel for inconsistency in find_inconsistencies(every)[0]] == [FORCE] * is_slip
 
 
 def test_ground_three_times_as_stiff_is_no_unit_error() -> None:

@@ -241,7 +241,9 @@ def test_runs_over_wider_steps_are_announced_too(is_helped: bool, monkeypatch: p
             linearised(problem, (SLOPE,), (0.61,), (0.0, 0.0))
             assert not announced & {(r, 0.61 + 0.06) for r in range(2)}
     assert (alone == []) == is_helped
-    problem.made_beside((0,), (SLOPE, MASS), (0.71, 0.2), (0.0,), 0.03, first=1)  # what is held is not looked at
+    problem.simulate_neighbourhood(
+        (0,), (SLOPE, MASS), (0.71, 0.2), (0.0,), 0.03, first=1
+    )  # what is held is not looked at
     assert (0, 0.71) in announced
     assert not announced & {(0, 0.71 - 0.03), (0, 0.71 - 0.06)}
 
@@ -356,7 +358,7 @@ def test_what_two_runs_differ_by_anyway_is_no_slope(early: bool) -> None:
 
     problem = Problem([replace(dataset(0.5 * wave, Chancy(number)), first_impact=blown) for number in range(40)])
     found = [problem.block(r, (FLAT,), (0.5,), 0.0, SETTINGS.forward.runs.fine) for r in range(40)]
-    J = np.array([b.plain_J[:, 0] for b in found if b is not None]) * SIGMA
+    J = np.array([b.unweighted_J[:, 0] for b in found if b is not None]) * SIGMA
     late = blown <= TIME
     # twenty waves, six neighbours and one difference tell it to 50 % in a recording, to 8 % in forty
     assert float(np.mean(np.sum(J[:, late] ** 2, axis=1))) == pytest.approx(float(np.sum(wave[late] ** 2)), rel=0.1)

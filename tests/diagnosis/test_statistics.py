@@ -15,12 +15,12 @@ from scipy.stats import kstest
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.linearisation import without_shift
+from rollover.diagnosis.fit.linearisation import without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
-from rollover.diagnosis.forward.averaging import thinned
+from rollover.diagnosis.forward.averaging import block_averaged
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
-from rollover.diagnosis.selection.score_test import null_of_the_best, p_value
+from rollover.diagnosis.selection.score_test import null_of_maximum, p_value
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from rollover.recording import Recording
@@ -108,7 +108,7 @@ def test_null_of_the_best_is_that_of_simulated_noise() -> None:
     d = [rng.standard_normal((50, 4)), rng.standard_normal((40, 4))]
     for part in d:
         part[:, 3] = part[:, 2] + 0.1 * rng.standard_normal(part.shape[0])  # two that are nearly one
-    null = null_of_the_best(d)
+    null = null_of_maximum(d)
     D = np.vstack(d)
     z = rng.standard_normal((20_000, 90)) @ (D / np.linalg.norm(D, axis=0))
     best = np.max(z * z, axis=1)
@@ -124,7 +124,7 @@ def test_freed_directions_are_measured_as_the_shift_leaves_them() -> None:
     v = rng.standard_normal((30, 1))
     # |v|^2 less what a time shift with its prior takes: v'(1 + sd^2 s s')^-1 v
     expected = float(v[:, 0] @ np.linalg.solve(np.eye(30) + 0.09 * np.outer(b.slope, b.slope), v[:, 0]))
-    assert float(np.sum(without_shift(v, b) ** 2)) == pytest.approx(expected, rel=1e-9)
+    assert float(np.sum(without_shift_direction(v, b) ** 2)) == pytest.approx(expected, rel=1e-9)
 
 
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
@@ -176,10 +176,10 @@ def test_binning_keeps_means_and_averages_across_no_gap() -> None:
     recording = Recording(
         title="r", time=time, channels={FORCE: 3.0 + 2.0 * time}, noise={FORCE: 2.0}
     )  # fmt: skip
-    found, _ = thinned(recording)
+    found, _ = block_averaged(recording)
     assert found.time.size < 1002
     assert np.allclose(found.channels[FORCE], 3.0 + 2.0 * found.time)
     assert not np.any((found.time > 0.1001) & (found.time < 0.1999))
     assert found.noise[FORCE] == pytest.approx(2.0 / np.sqrt(4.0))
     name, short = recorded({}, speeds=(2.0,))[0]
-    assert thinned(short)[0] is short, name
+    assert block_averaged(short)[0] is short, name

@@ -10,7 +10,7 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.fit.parameterisation import coordinate
 from rollover.diagnosis.selection import decision
-from rollover.diagnosis.selection.flexibility import bow, drift, is_a_curve, is_one_line, square
+from rollover.diagnosis.selection.flexibility import curvature_gain, drift, is_a_curve, is_straight_line, square
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 from tests.diagnosis.test_fits import GAIN, candidate, judge_of
@@ -36,7 +36,7 @@ def test_of_a_true_gain_nothing_curved_is_left(seed: int) -> None:
     c = candidate(problem, f"sensor-gain:{FORCE}")
     fitted = problem.fit((c,), (coordinate(1.05, c.search["gain"]),))
     assert fitted is not None
-    assert max(bow(problem, fitted, FORCE, term) for term in (square, drift)) < 11.0
+    assert max(curvature_gain(problem, fitted, FORCE, term) for term in (square, drift)) < 11.0
 
 
 def test_a_curve_is_seen_beside_the_gain_that_meets_it_best() -> None:
@@ -45,7 +45,7 @@ def test_a_curve_is_seen_beside_the_gain_that_meets_it_best() -> None:
     c = candidate(problem, f"sensor-gain:{FORCE}")
     fitted = problem.fit((c,), (coordinate(0.93, c.search["gain"]),))
     assert fitted is not None
-    assert bow(problem, fitted, FORCE) > 3.0 * SETTINGS.selection.flexibility.curve_gain
+    assert curvature_gain(problem, fitted, FORCE) > 3.0 * SETTINGS.selection.flexibility.curve_gain
 
 
 @pytest.mark.parametrize("is_ensemble", [False, True])
@@ -60,7 +60,7 @@ def test_a_gain_that_changes_as_it_warms_is_none(is_ensemble: bool) -> None:
     c = candidate(problem, f"sensor-gain:{FORCE}")
     fitted = problem.fit((c,), (coordinate(1.1, c.search["gain"]),))
     assert fitted is not None
-    assert bow(problem, fitted, FORCE, drift) > 3.0 * SETTINGS.selection.flexibility.curve_gain
+    assert curvature_gain(problem, fitted, FORCE, drift) > 3.0 * SETTINGS.selection.flexibility.curve_gain
     assert is_a_curve(problem, fitted)
 
 
@@ -70,13 +70,13 @@ def test_gain_and_offset_that_meet_a_curved_sensor_are_refused(monkeypatch: pyte
     fitted = problem.fit(both, [coordinate(1.0, both[0].search["gain"]), coordinate(1.0, both[1].search["bias"])])
     assert fitted is not None
     assert is_a_curve(problem, fitted)
-    assert is_one_line(both)
+    assert is_straight_line(both)
     mass = candidate(problem, "mass")
     beside = problem.fit((both[0], mass), (fitted.x[0], 0.6))
     assert beside is not None
     assert is_a_curve(problem, beside), "whatever stands beside its gain"
-    assert not is_one_line(beside.candidates)
-    assert not is_one_line([both[0], candidate(problem, f"sensor-bias:{DEPTH}")])
+    assert not is_straight_line(beside.candidates)
+    assert not is_straight_line([both[0], candidate(problem, f"sensor-bias:{DEPTH}")])
     assert not is_a_curve(problem, replace(beside, candidates=(mass, mass))), "of no line"
     monkeypatch.setattr(decision, "is_a_curve", lambda *_: True)
     found = diagnose(scenario(), recorded(GAIN, speeds=(1.2, 2.2, 3.2)))

@@ -15,7 +15,7 @@ from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.selection import scan
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.forward_step import _smoothly
+from rollover.diagnosis.selection.forward_step import _robust_short_fits
 from rollover.diagnosis.selection.screening import screen
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
@@ -90,7 +90,7 @@ def test_a_start_worse_on_the_worst_recording_is_dropped(monkeypatch: pytest.Mon
         return left_at(problem, candidates, x, shifts, use)
 
     monkeypatch.setattr(scan, "left_at", counted)
-    assert scan.strongly(problem, base, [SLOPE], [1, 2]) == {"slope": ((0.95,),)}
+    assert scan.strong_starts(problem, base, [SLOPE], [1, 2]) == {"slope": ((0.95,),)}
     assert asked[2] == {round(x, 9) for (x,) in SLOPE.strong()}
     assert asked[1] == {0.95}
 
@@ -104,7 +104,7 @@ def test_a_start_better_on_the_worst_recording_goes_to_all(
 
     monkeypatch.setattr(scan, "left_at", left_at)
     problem, base = tipped(20.0)
-    assert scan.strongly(problem, base, [SLOPE], [1, 2]) == ({} if full == masked else {"slope": ((0.95,),)})
+    assert scan.strong_starts(problem, base, [SLOPE], [1, 2]) == ({} if full == masked else {"slope": ((0.95,),)})
 
 
 def test_a_strong_effect_is_fitted_robustly_compared_in_full() -> None:
@@ -141,7 +141,7 @@ def test_a_strong_effect_is_fitted_robustly_compared_in_full() -> None:
         inquiry = Inquiry(
             problem=problem, candidates=(strength,), groups=[], phases=[], say=lambda _: None, executor=executor
         )
-        plain, smooth = inquiry.fits([task])[0], _smoothly(inquiry, [task], (0, 1))[0]
+        plain, smooth = inquiry.fits([task])[0], _robust_short_fits(inquiry, [task], (0, 1))[0]
     assert plain is not None
     assert abs(plain.x[0] - truth) > 0.1
     assert smooth.x[0] == pytest.approx(truth, abs=0.02)

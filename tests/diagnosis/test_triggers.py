@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.onset import about_clocks, from_first_contact
+from rollover.diagnosis.data.onset import clock_notes, zeros_from_contact
 from rollover.diagnosis.overlay import series
 from rollover.recording import Clock, Recording
 from rollover.system.errors import InputError
@@ -29,13 +29,13 @@ def drops(
 def test_an_untimed_drop_begins_at_its_contact(clock: Clock, late: tuple[float, float, float]) -> None:
     """`recorded` makes clocks late by half a millisecond itself, and the soil here is the scenario's."""
     plain = recorded({}, 3, channels=(FORCE, DEPTH, ACCELERATION), rate=1000.0)
-    found, notes = from_first_contact(scenario(), drops(clock, late))
+    found, notes = zeros_from_contact(scenario(), drops(clock, late))
     for (_, one), (_, other) in zip(found, plain, strict=True):
         assert np.max(np.abs(one.time - other.time)) < 2e-3
         assert one.clock.zero == "unknown"  # what is left is fitted
     said = [float(line.split(" at ")[1].split(" s,")[0]) for line in notes]
     assert said == pytest.approx(late, abs=2e-3)
-    again, silent = from_first_contact(scenario(), found)
+    again, silent = zeros_from_contact(scenario(), found)
     assert silent == []
     assert all(one is other for (_, one), (_, other) in zip(again, found, strict=True))
 
@@ -43,9 +43,9 @@ def test_an_untimed_drop_begins_at_its_contact(clock: Clock, late: tuple[float, 
 @pytest.mark.parametrize("clock", [Clock(), Clock(within=0.01)])
 def test_a_known_clock_stays_while_the_scenario_lasts(clock: Clock) -> None:
     given = drops(clock, (0.38, -0.1, 0.02))
-    assert from_first_contact(scenario(), given) == (given, [])
+    assert zeros_from_contact(scenario(), given) == (given, [])
     beyond = drops(clock, (7.0, 100.0, 1.7e9))
-    found, notes = from_first_contact(scenario(), beyond)
+    found, notes = zeros_from_contact(scenario(), beyond)
     assert all("shares no time with the scenario" in line for line in notes)
     assert max(abs(r.time[0] + 0.03) for _, r in found) < 5e-3
 
@@ -55,7 +55,7 @@ def test_a_wrong_known_clock_is_reported_with_its_cure(
     late: tuple[float, float, float],
 ) -> None:
     given = drops(Clock(), late)
-    said = list(about_clocks(scenario(), given, {}))
+    said = list(clock_notes(scenario(), given, {}))
     far = [(name, by) for (name, _), by in zip(given, late, strict=True) if abs(by) > 0.01]
     assert len(said) == len(far)
     for line, (name, by) in zip(said, far, strict=True):
@@ -64,7 +64,7 @@ def test_a_wrong_known_clock_is_reported_with_its_cure(
         assert line.endswith(
             "left as it is stated to be: `clock: {zero: unknown}` in its sidecar or profile sets it there"
         )
-    assert not list(about_clocks(scenario(), drops(Clock(within=0.01), late), {}))  # the fitted shift has room for it
+    assert not list(clock_notes(scenario(), drops(Clock(within=0.01), late), {}))  # the fitted shift has room for it
 
 
 def test_a_diagnosis_reports_a_wrong_clock_and_frees_it() -> None:
@@ -83,7 +83,7 @@ def test_what_begins_within_its_blow_is_laid_over_the_simulation() -> None:
         (name, replace(r, time=r.time[50:], channels={c: v[50:] for c, v in r.channels.items()}))
         for name, r in drops(Clock(zero="unknown"), (0.4, 0.4, 0.4))
     ]
-    found, notes = from_first_contact(scenario(), given)
+    found, notes = zeros_from_contact(scenario(), given)
     assert all("by least-squares alignment of" in line for line in notes)
     assert [r.time[0] for _, r in found] == pytest.approx([r.time[0] - 0.4 for _, r in given], abs=2e-3)
 
@@ -94,7 +94,7 @@ def test_a_clock_beyond_the_scenario_is_refused_by_name() -> None:
     rows = one.time < 3600.0 - 2e-3
     fall = replace(one, time=one.time[rows], channels={c: v[rows] for c, v in one.channels.items()})
     with pytest.raises(InputError, match=f"^{name}: clock: its time zero cannot be determined, got stamps from 3599.9"):
-        from_first_contact(scenario(), [(name, fall)])
+        zeros_from_contact(scenario(), [(name, fall)])
 
 
 def test_what_is_missing_is_named_from_drops_that_nobody_timed() -> None:

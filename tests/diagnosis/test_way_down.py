@@ -101,23 +101,25 @@ def test_a_truncated_fit_is_a_start_if_it_gains_much(
     monkeypatch.setattr(truncated_start, "_cut", lambda *_: "cut")
     monkeypatch.setattr(truncated_start, "Problem", lambda _: early)
     monkeypatch.setattr(truncated_start, "align", lambda _: None)
-    monkeypatch.setattr(truncated_start, "one_by_one", one_by_one)
+    monkeypatch.setattr(truncated_start, "forward_selection", one_by_one)
     back = {"moves": np.inf}
-    monkeypatch.setattr(truncated_start, "moving_back", lambda *_: back["moves"])
+    monkeypatch.setattr(truncated_start, "rebound_residual", lambda *_: back["moves"])
     whole = Inquiry(
         problem=cast(Any, problem), candidates=(), groups=[], phases=[()], say=lambda _: None,
         executor=cast(Any, SimpleNamespace(fits=lambda _, tasks, __: [fit(j.candidates, 5_000.0) for j in tasks])),
     )  # fmt: skip
-    found = truncated_start.down_first(whole, before)
+    found = truncated_start.loading_first(whole, before)
     assert found is (there if better else before)
     ways = [[], ["soil-layer"], ["soil-elastic-rebound"], ["soil-elastic-rebound"]]
     assert asked == ways[: 4 if above < 60.0 else 1], "the way down, as it springs back, the first rise, the whole"
     assert problem.simulations == (15 if above < 60.0 else 7)
     assert reweighted == ([["whole"]] if over_all > 900.0 else []), "as it was before a way that led nowhere"
     little = taken(base, fit((MASS,), 60.0))
-    assert truncated_start.down_first(whole, little) is little
+    assert truncated_start.loading_first(whole, little) is little
     back["moves"] = 50.0
-    assert truncated_start.down_first(whole, before) is before, "what rests as simulated is no reason for ten thousand"
+    assert truncated_start.loading_first(whole, before) is before, (
+        "what rests as simulated is no reason for ten thousand"
+    )
 
 
 def test_the_way_down_ends_before_the_deepest_point() -> None:
@@ -150,7 +152,7 @@ def test_holding_ground_moves_nothing_during_unloading(rig: dict[str, float], is
     phases = [drop_phases(e) for e in dataset]
     asking = Inquiry(problem=problem, candidates=(), groups=[], phases=phases, say=lambda _: None, executor=Executor())
     beyond = base.left - sum(b.residual.size for b in base.blocks)
-    moved = truncated_start.moving_back(asking, base)
+    moved = truncated_start.rebound_residual(asking, base)
     assert (
         moved > 0.1 * beyond if is_back else abs(moved) < 0.1 * SETTINGS.selection.truncated_start.least_share * beyond
     )
@@ -158,4 +160,4 @@ def test_holding_ground_moves_nothing_during_unloading(rig: dict[str, float], is
     cut = Problem([e for e in early if e is not None])
     above = cut.fit((), ())
     assert above is not None
-    assert truncated_start.moving_back(replace(asking, problem=cut), above) == np.inf, "nothing tells of it"
+    assert truncated_start.rebound_residual(replace(asking, problem=cut), above) == np.inf, "nothing tells of it"

@@ -11,7 +11,7 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.noise.offsets import Zero, _differ, _own, _stand
+from rollover.diagnosis.noise.offsets import Zero, _are_stationary, _differ, _own
 from rollover.diagnosis.prepared import prepared, with_common_noise
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
@@ -110,5 +110,5 @@ def test_what_wanders_before_anything_is_hit_has_no_zero() -> None:
         [Zero(r=r, k=0, off=9.0 * r, error=1.0, slow=v) for r in range(3)]
         for v in (SETTINGS.noise.offsets.wave_terms, 10.0)
     )
-    assert _stand([still])
-    assert not _stand([still, wandering, wandering])
+    assert _are_stationary([still])
+    assert not _are_stationary([still, wandering, wandering])

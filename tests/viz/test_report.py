@@ -151,9 +151,7 @@ def test_the_verdict_says_what_it_rests_on(overturn: Run, peaks: tuple[PeakLoad,
     assert (missed.state, "not met: distance of the structure" in missed.detail) == ("fail", True)
 
 
-def test_trajectory_then_loads_then_standards(
-    overturn: Run, peaks: tuple[PeakLoad, ...]
-) -> None:
+def test_trajectory_then_loads_then_standards(overturn: Run, peaks: tuple[PeakLoad, ...]) -> None:
     text = report.page(overturn, peaks, ANSWER, rows=[SIDE, ZONE])
     order = re.findall(r"<h2>(.*?)</h2>", text)
     assert order[:4] == ["How it went", "Peak loads", "Calibrated domain", "Against standards"]
@@ -166,9 +164,7 @@ def test_trajectory_then_loads_then_standards(
     assert "How it went" not in report.page(example.drop(), (), ANSWER), "a striker goes straight down"
 
 
-def test_a_test_stand_answers_whether_all_is_met(
-    overturn: Run, peaks: tuple[PeakLoad, ...]
-) -> None:
+def test_a_test_stand_answers_whether_all_is_met(overturn: Run, peaks: tuple[PeakLoad, ...]) -> None:
     tested = replace(overturn, tests=({"kind": "tilt", "name": "x"},))
     near = min(a.least for a in approaches(overturn))
     met, missed = replace(SIDE, verdict="met", margin=0.1), replace(SIDE, verdict="not met")

@@ -122,7 +122,7 @@ def diagnose(
     from rollover.diagnosis.fit.jobs import Executor
     from rollover.diagnosis.io import FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
     from rollover.diagnosis.overlay import series
-    from rollover.diagnosis.sensors_first import check, diagnosed, plain, prechecked
+    from rollover.diagnosis.sensors_first import check, diagnosed, plain, sensor_precheck
     from rollover.spec import document
     from rollover.system.writing import notes
 
@@ -150,7 +150,7 @@ def diagnose(
     about["origin"] = results.origin(path, folder, set_ or [])
     results.claim_account(folder, FORMAT, about, FILES, force=force, say=console.say)
     console.say("asking the sensors first")
-    findings = prechecked(chosen, measured)
+    findings = sensor_precheck(chosen, measured)
     # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted
     notebook = notes(folder)
     about_fits = json.dumps([about, results.versions()], sort_keys=True)

@@ -16,9 +16,9 @@ from rollover.diagnosis.data.whitening import Noise, Whitening
 from rollover.diagnosis.forward.discontinuities import (
     DISCONTINUITY_IN,
     SHOWS,
-    about_discontinuities,
-    beside_discontinuities,
     masked,
+    near_discontinuity,
+    weights_after_discontinuities,
 )
 from rollover.diagnosis.forward.forward_model import Simulator
 from rollover.diagnosis.settings import SETTINGS
@@ -151,10 +151,12 @@ class Dataset:
 
         Such an error is one for the whole signal, not one for each sample: within its size it is nothing.
         """
-        known = s.scatter > 0.0 or self.error_of(s) > TUNING.model_error
-        return known and float(np.hypot(s.scatter, self.error_of(s) * s.span)) > TUNING.other_error_share * s.noise
+        known = s.scatter > 0.0 or self.model_error_of(s) > TUNING.model_error
+        return (
+            known and float(np.hypot(s.scatter, self.model_error_of(s) * s.span)) > TUNING.other_error_share * s.noise
+        )
 
-    def error_of(self, s: Signal) -> float:
+    def model_error_of(self, s: Signal) -> float:
         """What the model may miss a signal by, as a share of its range: integrators' error and the discrepancy."""
         if not self.discrepancy:
             return self.model_error
@@ -196,7 +198,7 @@ class Dataset:
     def discontinuities(self, raw: Array, predicted: Mapping[str, Array] = NOTHING) -> NDArray[np.int64]:
         """Samples (stacked) about which a prediction leaps, and means within which it is `predicted` to."""
         own = self._inside
-        found: NDArray[np.bool_] = about_discontinuities(raw, own.least, own.first, own.last)
+        found: NDArray[np.bool_] = near_discontinuity(raw, own.least, own.first, own.last)
         for s, part in self.spans():
             size = predicted.get(DISCONTINUITY_IN + s.channel)
             if size is not None:
@@ -229,7 +231,9 @@ class Dataset:
     def worth(self, discontinuities: NDArray[np.int64]) -> Array:
         """Weights (n,) of whitened samples: those whose past was forgiven are as wide as the noise itself."""
         found: Array = (
-            beside_discontinuities(discontinuities, *self._memories) if discontinuities.size else np.ones(self.count)
+            weights_after_discontinuities(discontinuities, *self._memories)
+            if discontinuities.size
+            else np.ones(self.count)
         )
         return found
 
@@ -258,12 +262,14 @@ class Dataset:
         return np.concatenate([s.values for s in self.signals])
 
 
-def doubted(e: Dataset, scenario: Scenario) -> Dataset:
+def with_uncertain_conditions(e: Dataset, scenario: Scenario) -> Dataset:
     """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
-    return doubted_beside(replace(e, doubtful=tuple(doubts(scenario, e.recording.uncertainty, e.name))), {})
+    return with_uncertain_conditions_at(
+        replace(e, doubtful=tuple(doubts(scenario, e.recording.uncertainty, e.name))), {}
+    )
 
 
-def doubted_beside(e: Dataset, beside: Mapping[str, Any], shift: float = 0.0) -> Dataset:
+def with_uncertain_conditions_at(e: Dataset, beside: Mapping[str, Any], shift: float = 0.0) -> Dataset:
     """The same with that as it is beside values that are exchanged: there an error of a condition does something else.
 
     `shift` is the recording's time shift there, s.
@@ -308,12 +314,12 @@ def dataset_of(name: str, recording: Recording, simulator: Simulator, averaged: 
         simulator=simulator,
         signals=tuple(signals),
         shift_prior=recording.clock.within or (TUNING.loose_shift_prior if loose else TUNING.shift_prior + 0.5 * step),
-        condition=condition_of(recording.conditions),
+        condition=condition_name(recording.conditions),
         averaged=averaged,
     )
 
 
-def foreign_to(simulator: Simulator, name: str, recording: Recording) -> list[Fault]:
+def no_common_channel(simulator: Simulator, name: str, recording: Recording) -> list[Fault]:
     """That nothing that was recorded is simulated, where that is so."""
     made = simulator.predict({}, 0.0)
     if made is None or made.keys() & recording.channels.keys():
@@ -333,7 +339,7 @@ def _oversampling(recording: Recording, channel: str) -> int:
 def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float, tuple[float, ...]]:
     """Noise (1 sigma) and its colour, from the misfit; from the channel itself where that shows clearly less."""
     if values.size < LENGTH:
-        return (stated if stated is not None else by_differences(residual)), ()
+        return (stated if stated is not None else noise_from_differences(residual)), ()
     best, other = (_floor(v) for v in (residual, values))
     if other.sigma < TUNING.own_noise_below * best.sigma:
         best = other
@@ -346,7 +352,7 @@ def _floor(values: Array) -> NoiseFloor:
     return noise_floor(values, order=2, strides=(1,)) if one.windows >= TUNING.memory_windows else one
 
 
-def by_differences(values: Array) -> float:
+def noise_from_differences(values: Array) -> float:
     """Noise of a short series from its second differences: sd = 1.4826 median|d2|/sqrt(6)."""
     if values.size < 5:
         return 0.0
@@ -354,7 +360,7 @@ def by_differences(values: Array) -> float:
     return float(USUAL * np.median(np.abs(d - np.median(d))) / np.sqrt(6.0))
 
 
-def condition_of(conditions: Mapping[str, Any]) -> str:
+def condition_name(conditions: Mapping[str, Any]) -> str:
     """Name of the condition that a recording was run under: recordings alike share it."""
     return ", ".join(
         f"{path}={value:g}" if isinstance(value, float) else f"{path}={value}"
@@ -364,11 +370,11 @@ def condition_of(conditions: Mapping[str, Any]) -> str:
 
 def left_out(dataset: Sequence[Dataset]) -> list[list[int]]:
     """What is left out in turn: one condition after another, or one recording after another if all share one."""
-    groups = groups_of(dataset)
+    groups = condition_groups(dataset)
     return groups if len(groups) > 1 else [[k] for k in range(len(dataset))]
 
 
-def groups_of(dataset: Sequence[Dataset]) -> list[list[int]]:
+def condition_groups(dataset: Sequence[Dataset]) -> list[list[int]]:
     """Places of the recordings that share a condition, one list for each condition."""
     found: dict[str, list[int]] = {}
     for k, e in enumerate(dataset):

@@ -65,18 +65,18 @@ class Inconsistency(Aside):
         )
 
 
-def inconsistencies_of(every: Sequence[Dataset]) -> tuple[list[Inconsistency], list[Inconsistency]]:
+def find_inconsistencies(every: Sequence[Dataset]) -> tuple[list[Inconsistency], list[Inconsistency]]:
     """Slips that only some recordings of a channel have, and those that all of them share."""
     met: dict[str, list[tuple[Dataset, Signal, float]]] = {}
     for e in every:
         made = e.simulator.predict({}, 0.0) or {}
         for s in e.signals:
-            factor = factor_of(e, s, made[s.channel]) if s.channel in made else None
+            factor = relative_scale(e, s, made[s.channel]) if s.channel in made else None
             if factor is not None:
                 met.setdefault(s.channel, []).append((e, s, factor))
     found = []
     for each in met.values():
-        beside = _beside(each[0][1].channel, float(np.median([abs(factor) for *_, factor in each])))
+        beside = _usual_factor(each[0][1].channel, float(np.median([abs(factor) for *_, factor in each])))
         found += [
             inconsistency
             for one in each
@@ -100,19 +100,19 @@ def _is_chance(inconsistency: Inconsistency) -> bool:
     return apart > (1.0 - TUNING.least_correlation**2) * float(np.sum(made[channel][rows] ** 2))
 
 
-def without(every: Sequence[Dataset], inconsistencies: Sequence[Inconsistency]) -> list[Dataset]:
+def without_inconsistent(every: Sequence[Dataset], inconsistencies: Sequence[Inconsistency]) -> list[Dataset]:
     """The evidence without channels that are misread by a slip, nor recordings of nothing else."""
     aside = {(inconsistency.dataset.name, inconsistency.signal.channel) for inconsistency in inconsistencies}
     left = [replace(e, signals=tuple(s for s in e.signals if (e.name, s.channel) not in aside)) for e in every]
     return [e for e in left if e.signals] if aside else list(every)
 
 
-def by_inconsistencies(found: Sequence[Aside]) -> str:
+def inconsistency_evidence(found: Sequence[Aside]) -> str:
     """What stands behind a verdict where channels were left aside; nothing where none was."""
     return "".join(f" {inconsistency.says()}" for inconsistency in found)
 
 
-def factor_of(e: Dataset, s: Signal, made: np.ndarray) -> float | None:
+def relative_scale(e: Dataset, s: Signal, made: np.ndarray) -> float | None:
     """How many times what is simulated a signal reads, where the two are alike; None if nowhere."""
     time, m, best = e.recording.time[s.rows], s.values, (0.0, 0.0)
     size = float(np.linalg.norm(m))
@@ -124,19 +124,19 @@ def factor_of(e: Dataset, s: Signal, made: np.ndarray) -> float | None:
     return best[1] if best[0] > TUNING.least_correlation else None
 
 
-def _beside(channel: str, usual: float) -> float:
+def _usual_factor(channel: str, usual: float) -> float:
     """Factor that is no slip's, of what the recordings of a channel usually are off by: what is missing makes it.
 
     Where it is near no slip's, all of it.
     """
-    known = (1.0, *(abs(cause) for cause, _ in _causes(describe(channel).unit)))
-    near = min(known, key=lambda one: _off(usual, one))
-    return usual / near if _off(usual, near) < TUNING.common_factor_tolerance else usual
+    known = (1.0, *(abs(cause) for cause, _ in _usual_slips(describe(channel).unit)))
+    near = min(known, key=lambda one: _log_distance(usual, one))
+    return usual / near if _log_distance(usual, near) < TUNING.common_factor_tolerance else usual
 
 
 def _inconsistency(e: Dataset, s: Signal, factor: float, beside: float) -> Inconsistency | None:
-    near = min(_causes(describe(s.channel).unit), key=lambda cause: _off(factor / beside, cause[0]))
-    if _off(factor / beside, near[0]) > TUNING.factor_tolerance:
+    near = min(_usual_slips(describe(s.channel).unit), key=lambda cause: _log_distance(factor / beside, cause[0]))
+    if _log_distance(factor / beside, near[0]) > TUNING.factor_tolerance:
         return None
     return Inconsistency(dataset=e, signal=s, factor=factor, cause=near[1])
 
@@ -149,13 +149,13 @@ def _is_shared(inconsistency: Inconsistency, found: Sequence[Inconsistency], eve
     return alike == heard and (inconsistency.factor > 0.0 or not is_length(channel))
 
 
-def _off(factor: float, other: float) -> float:
+def _log_distance(factor: float, other: float) -> float:
     """How far a factor is from another, of its logarithm; infinite for one of the other sign."""
     return abs(math.log(factor / other)) if factor * other > 0.0 else math.inf
 
 
 @cache
-def _causes(unit: str) -> tuple[tuple[float, str], ...]:
+def _usual_slips(unit: str) -> tuple[tuple[float, str], ...]:
     """(factor, what makes it) of each slip that a channel of this unit may have, the usual units first."""
     return tuple(_each(unit))
 

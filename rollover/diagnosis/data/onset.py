@@ -24,18 +24,18 @@ from rollover.system.errors import Fault, InputError
 TUNING = SETTINGS.data.onset
 
 
-def from_first_contact(
+def zeros_from_contact(
     scenario: Scenario, recordings: Sequence[tuple[str, Recording]]
 ) -> tuple[list[tuple[str, Recording]], list[str]]:
     """The recordings, those whose clock is in doubt with the zero that they show, and a line for each of these.
 
-    Raises `InputError`, see `at_their_zeros`.
+    Raises `InputError`, see `with_clock_zeros`.
     """
-    found, zeros = at_their_zeros(scenario, recordings)
+    found, zeros = with_clock_zeros(scenario, recordings)
     return found, [f"{name}: {zero.sentence}" for name, zero in zeros.items()]
 
 
-def at_their_zeros(
+def with_clock_zeros(
     scenario: Scenario, recordings: Sequence[tuple[str, Recording]]
 ) -> tuple[list[tuple[str, Recording]], dict[str, Zero]]:
     """The recordings, those whose clock is in doubt with the zero that they show, and these zeros by name.
@@ -59,7 +59,7 @@ def at_their_zeros(
     return found, zeros
 
 
-def about_clocks(
+def clock_notes(
     scenario: Scenario, recordings: Sequence[tuple[str, Recording]], zeros: Mapping[str, Zero]
 ) -> Iterator[str]:
     """A line on each clock that was set, and on each that is said to be right, is clearly off, and was left so.
@@ -69,14 +69,14 @@ def about_clocks(
     for name, recording in recordings:
         if name in zeros:
             yield f"{name}: {zeros[name].sentence}"
-        elif recording.clock == Clock() and (zero := _found_off(scenario, name, recording)) is not None:
+        elif recording.clock == Clock() and (zero := _wrong_zero(scenario, name, recording)) is not None:
             yield (
                 f"{name}: {zero.sentence}; left as it is stated to be: `clock: {{zero: unknown}}` in its sidecar or "
                 "profile sets it there"
             )
 
 
-def _found_off(scenario: Scenario, name: str, recording: Recording) -> Zero | None:
+def _wrong_zero(scenario: Scenario, name: str, recording: Recording) -> Zero | None:
     """The zero of a clock that is said to be right and is not; None where it is, or where to look takes a full run."""
     under = set_up(scenario, recording)
     return None if unfit(under) else timed(name, recording, under).zero
@@ -101,7 +101,7 @@ def _moved(scenario: Scenario, name: str, recording: Recording) -> tuple[Recordi
     return replace(at.recording, clock=loose), at.zero
 
 
-def first_shown(e: Dataset) -> Iterator[float]:
+def onset_delay(e: Dataset) -> Iterator[float]:
     """How late (s) the first contact would be if it were what a channel shows first, of each that is quiet before."""
     for s in e.signals:
         off = np.abs(s.values - np.median(s.values[:QUIET])) > CLEAR * s.sigma

@@ -41,7 +41,7 @@ def pile(values: Array) -> float:
     )
 
 
-def digitised(dataset: Sequence[Dataset], recordings: Sequence[Recording]) -> list[Dataset]:
+def with_quantisation(dataset: Sequence[Dataset], recordings: Sequence[Recording]) -> list[Dataset]:
     """The evidence with what rounding to the steps of its channels, as recorded, makes neighbouring samples share.
 
     Noise makes the error of each sample its own, and part of the noise: with s of it before a step d, Widrow's theorem

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Dataset, groups_of
+from rollover.diagnosis.data.dataset import Dataset, condition_groups
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ TUNING = SETTINGS.data.repeatability
 def with_scatter(found: Sequence[Dataset]) -> list[Dataset]:
     """The evidence with the scatter of each channel, where any condition was recorded more than once."""
     apart: dict[tuple[int, str], list[float]] = {}
-    for group in groups_of(found):
+    for group in condition_groups(found):
         for a, b in combinations(group, 2):
             for s in found[a].signals:
                 power = _difference(found[a], found[b], s.channel)
@@ -33,7 +33,7 @@ def with_scatter(found: Sequence[Dataset]) -> list[Dataset]:
                         apart.setdefault((r, s.channel), []).append(power)
     own: dict[tuple[int, str], float] = {}
     shares: dict[str, list[float]] = {}
-    for group in groups_of(found):
+    for group in condition_groups(found):
         # the least noise of those alike: the others' may hold what they differ by
         noise: dict[str, float] = {}
         for s in (s for r in group for s in found[r].signals):
@@ -59,10 +59,10 @@ def with_scatter(found: Sequence[Dataset]) -> list[Dataset]:
     ]
 
 
-def differing(found: Sequence[Dataset], share: float = TUNING.reported_difference) -> list[str]:
+def inconsistent_repeats(found: Sequence[Dataset], share: float = TUNING.reported_difference) -> list[str]:
     """Repeats that differ by more than noise and more than a share of the range, a line for each condition, channel."""
     lines = []
-    for group in groups_of(found):
+    for group in condition_groups(found):
         for s in found[group[0]].signals if len(group) > 1 else ():
             most = max(
                 (t.scatter / t.span for r in group for t in found[r].signals if t.channel == s.channel), default=0.0
@@ -73,7 +73,7 @@ def differing(found: Sequence[Dataset], share: float = TUNING.reported_differenc
     return lines
 
 
-def against_itself(verdict: str, contrary: Sequence[str]) -> str:
+def contradiction_clause(verdict: str, contrary: Sequence[str]) -> str:
     """What a sentence goes on with where recordings contradict each other."""
     if verdict != "cannot-tell" or not contrary:
         return ""

@@ -13,7 +13,9 @@ MEASURED = ("initiation.speed", "vehicle.mass")  # what is read off an instrumen
 TUNING = SETTINGS.data.rounding
 
 
-def to_the_last_digit(recordings: Sequence[tuple[str, Recording]]) -> tuple[list[tuple[str, Recording]], list[str]]:
+def with_rounding_uncertainty(
+    recordings: Sequence[tuple[str, Recording]],
+) -> tuple[list[tuple[str, Recording]], list[str]]:
     """The recordings with the rounding of what was measured as its uncertainty, and a line for each such condition.
 
     1 sigma is 10^-d/sqrt(12), d the most decimals in which any recording states that condition: 1.9 beside 2.19 is

@@ -8,9 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.finite_differences import Point, beside, in_step, in_time, looked_at, wider
+from rollover.diagnosis.fit.finite_differences import (
+    Point,
+    beside,
+    clock_aligned_difference,
+    needs_wider_step,
+    stencil,
+    time_derivative,
+)
 from rollover.diagnosis.fit.notebook import Memory
-from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own, key_at
+from rollover.diagnosis.fit.parameterisation import Candidate, key_at, with_slices
 from rollover.diagnosis.forward.full_run import full_runs, made_ahead, perturbations_of
 from rollover.diagnosis.settings import SETTINGS
 from rollover.system.processes import Children
@@ -51,11 +58,11 @@ class Simulations:
         """Make full runs of (recording, candidates, x) side by side where there are children to do it."""
         made_ahead(self._children, ((self.dataset[r].simulator, self.changes(c, x)) for r, c, x in wanted))
 
-    def made_scattered(self, changes: Mapping[str, object], parts: int = 1) -> None:
+    def simulate_ensembles(self, changes: Mapping[str, object], parts: int = 1) -> None:
         """Make what all recordings' runs with `changes` and their neighbours' are, as `perturbed` asks for them."""
         made_ahead(self._children, perturbations_of([e.simulator for e in self.dataset], changes, parts))
 
-    def made_beside(
+    def simulate_neighbourhood(
         self,
         use: Sequence[int],
         candidates: Sequence[Candidate],
@@ -76,16 +83,18 @@ class Simulations:
             off = self._off(r, at, shift)
             todo += [(r, k, off) for k in range(first, len(x)) if off is not None]
         while todo:
-            todo = [(r, k, o) for r, k, o in todo if wider(self.dataset[r], o, at, k, width, self.effort.wide)]
+            todo = [
+                (r, k, o) for r, k, o in todo if needs_wider_step(self.dataset[r], o, at, k, width, self.effort.wide)
+            ]
             width *= 2.0
-            self.made_ahead((r, candidates, there) for r, k, _ in todo for there in looked_at(at, k, width))
+            self.made_ahead((r, candidates, there) for r, k, _ in todo for there in stencil(at, k, width))
 
     def _off(self, r: int, at: Point, shift: float) -> Callable[[Point], Array | None] | None:
         """What the prediction of recording r differs by from a point to another, as clocks would have it."""
         raw = self.raw(r, *at, shift)
         if raw is None:
             return None
-        slope = self._in_time(r, *at, shift, raw)
+        slope = self._time_derivative(r, *at, shift, raw)
         return lambda end: self.moved(r, at, end, shift, slope)
 
     def predicted(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
@@ -115,7 +124,9 @@ class Simulations:
             self._discontinuities[key_at(r, candidates, x, shift)] = discontinuities
         return self.dataset[r].masked(y, discontinuities)
 
-    def edged(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+    def predicted_with_jumps(
+        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float
+    ) -> Array | None:
         """Stacked prediction of recording r, SI, with its leaps as they are; not remembered. None if it fails."""
         found = self._made(r, candidates, x, shift)
         return None if found is None else found[0]
@@ -138,26 +149,30 @@ class Simulations:
         """Values to exchange in the scenario."""
         found: dict[str, object] = {}
         ids = [c.id for c in candidates]
-        for k, (c, own) in enumerate(each_with_own(candidates)):
+        for k, (c, own) in enumerate(with_slices(candidates)):
             found |= c.changes(x[own], 1 + ids[:k].count(c.id))
         return found
 
-    def _in_time(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, raw: Array) -> Array:
+    def _time_derivative(
+        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, raw: Array
+    ) -> Array:
         """dy/dtau (n,) of recording r, SI, `raw` y there."""
         changes, later = self.changes(candidates, x), self.effort.later
-        return in_time(self.dataset[r], changes, shift, raw, later, both=self.effort.is_ensemble)
+        return time_derivative(self.dataset[r], changes, shift, raw, later, both=self.effort.is_ensemble)
 
     def moved(self, r: int, before: Point, after: Point, shift: float, slope: Array | None = None) -> Array | None:
         """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
 
         A leap that moves past a sample is no slope, and what is forgiven there follows the measurement. With `slope`,
-        dy/dtau (n,) before, SI, the two are compared as a clock would have them, see `in_step`.
+        dy/dtau (n,) before, SI, the two are compared as a clock would have them, see `clock_aligned_difference`.
         """
         first, last = self.raw(r, *before, shift), self.raw(r, *after, shift)
         if first is None or last is None:
             return None
         if slope is not None:
-            last = in_step(self.dataset[r], first, last, slope, lambda d: self.edged(r, *after, shift + d))
+            last = clock_aligned_difference(
+                self.dataset[r], first, last, slope, lambda d: self.predicted_with_jumps(r, *after, shift + d)
+            )
         d = last - first
         for point in (before, after):
             d[self._discontinuities.get(key_at(r, *point, shift), NONE)] = 0.0

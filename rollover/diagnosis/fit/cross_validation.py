@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, shift_of
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, time_shift_step
 from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 from rollover.diagnosis.settings import SETTINGS
 
@@ -49,7 +49,7 @@ def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> Held:
     normals = [b.normal() for b in fitted.blocks]
     left = np.array([max(c, 0.0) for _, _, c in normals])
     for group in groups:
-        dx = _without(fitted, group)
+        dx = _leave_out_step(fitted, group)
         dx = np.clip(np.array(fitted.x) + dx, -0.25, 1.25) - np.array(fitted.x)
         for r in group:
             A, b, c = normals[r]
@@ -62,11 +62,13 @@ def cross_validated(problem: Problem, fitted: Fitted, groups: Sequence[Sequence[
     if not fitted.x:
         return fitted
     left: list[float] = [b.normal()[2] for b in fitted.blocks]
-    places = {r: np.clip(np.array(fitted.x) + _without(fitted, group), 0.0, 1.0) for group in groups for r in group}
+    places = {
+        r: np.clip(np.array(fitted.x) + _leave_out_step(fitted, group), 0.0, 1.0) for group in groups for r in group
+    }
     problem.made_ahead((r, fitted.candidates, [float(v) for v in x]) for r, x in places.items())
     for r, x in places.items():
         old = fitted.blocks[r]
-        shift = old.shift + shift_of(old, x - np.array(fitted.x))
+        shift = old.shift + time_shift_step(old, x - np.array(fitted.x))
         there = problem.clocked(r, fitted.candidates, [float(v) for v in x], shift, problem.effort.clocked)
         if there is None:
             return fitted
@@ -74,7 +76,7 @@ def cross_validated(problem: Problem, fitted: Fitted, groups: Sequence[Sequence[
     return replace(fitted, cross_validated=tuple(left))
 
 
-def refitted(
+def cross_validated_by_refits(
     problem: Problem,
     fitted: Fitted,
     groups: Sequence[Sequence[int]],
@@ -92,7 +94,7 @@ def refitted(
         return fitted
     shifts = [b.shift for b in fitted.blocks]
     left = [b.normal()[2] for b in fitted.blocks]
-    look = partial(_by_the_rest, at=(fitted.candidates, fitted.x), shifts=shifts)
+    look = partial(_held_out_refit, at=(fitted.candidates, fitted.x), shifts=shifts)
     for group, found in zip(groups, parallel_map(problem, look, groups), strict=True):
         if found is None:
             return fitted
@@ -101,7 +103,9 @@ def refitted(
     return replace(fitted, cross_validated=tuple(left))
 
 
-def _by_the_rest(problem: Problem, group: Sequence[int], *, at: Point, shifts: Sequence[float]) -> list[float] | None:
+def _held_out_refit(
+    problem: Problem, group: Sequence[int], *, at: Point, shifts: Sequence[float]
+) -> list[float] | None:
     """What a fit to all other recordings, begun at a point, leaves of each of a group; None where one fails."""
     (candidates, x), rest = at, [r for r in range(len(shifts)) if r not in group]
     other = problem.fit(candidates, x, only=rest, shifts=[shifts[r] for r in rest], width=1)
@@ -112,7 +116,7 @@ def _by_the_rest(problem: Problem, group: Sequence[int], *, at: Point, shifts: S
     return left if len(left) == len(found) else None
 
 
-def _without(fitted: Fitted, group: Sequence[int]) -> Array:
+def _leave_out_step(fitted: Fitted, group: Sequence[int]) -> Array:
     """Step (p,) from a fit to where it would be without a group of recordings; of one group alone, by its own."""
     normals, p = [b.normal() for b in fitted.blocks], len(fitted.x)
     rest = [r for r in range(len(normals)) if r not in group] or list(group)
@@ -120,7 +124,9 @@ def _without(fitted: Fitted, group: Sequence[int]) -> Array:
     return np.asarray(np.linalg.solve(A + SETTINGS.fit.linearisation.weak_prior * np.eye(p), b)) if p else b
 
 
-def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]], shared: float = 1.0) -> tuple[float, float]:
+def held_out_disadvantage(
+    rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]], shared: float = 1.0
+) -> tuple[float, float]:
     """How much worse a rival predicts held-out recordings, as two scores; both above 2 exclude it.
 
     First: the excess of its squares over that of the best, in standard errors of the noise: for predictions that differ
@@ -131,7 +137,7 @@ def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]], shared: 
     dispersion = max(1.0, float(np.sqrt(b.left.sum() / b.count.sum())))
     apart = np.zeros(len(best.blocks))
     for r, (x, y) in enumerate(zip(rival.blocks, best.blocks, strict=True)):
-        d = y.counted(x.plain_residual - y.plain_residual)
+        d = y.counted(x.unweighted_residual - y.unweighted_residual)
         apart[r] = float(d @ d) - float(y.slope @ d) ** 2 / y.weight
     distance = float(apart.sum())
     excess = float(a.left.sum() - b.left.sum())

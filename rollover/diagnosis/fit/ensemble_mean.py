@@ -23,17 +23,17 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.jobs import linearised
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import ResidualBlock, shift_of
+from rollover.diagnosis.fit.linearisation import ResidualBlock, time_shift_step
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
-from rollover.diagnosis.noise.ensemble import alike, heavy_tail, weighted
+from rollover.diagnosis.noise.ensemble import heavy_tail, neighbours_on_same_course, with_sample_weights
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.fit.ensemble_mean
 
 
-def settled(problem: Problem, part: Step) -> Step:
+def refined_under_scatter(problem: Problem, part: Step) -> Step:
     """A step under the scatter of runs with its explanation, moved to where the mean of them is met best (D8).
 
     Slopes beside a leap lead astray, and so may clocks that a wrong place has bent: it is moved again until a step
@@ -41,31 +41,31 @@ def settled(problem: Problem, part: Step) -> Step:
     is met best. As it was if nothing can be simulated there; where runs do not scatter too. Its rivals are not put
     under that scatter: that costs runs, see `Step.again`.
     """
-    rescattered(problem, part.fitted)
+    with_ensemble_scatter(problem, part.fitted)
     slopes = problem.again(part.fitted)
     places = [slopes]
     for _ in range(TUNING.most_steps):
         here = places[-1]
         if not any(e.perturbed for e in problem.dataset):
             break
-        dx = step_of_means(problem.dataset, here.blocks)
-        if promised(here.blocks, dx) < max(
+        dx = ensemble_mean_step(problem.dataset, here.blocks)
+        if predicted_gain(here.blocks, dx) < max(
             TUNING.least_gain, TUNING.least_gain_share * (here.left - sum(b.size for b in here.blocks))
         ):
             break
-        there = _onward(problem, here, np.clip(dx, -TUNING.longest_step, TUNING.longest_step))
+        there = _line_search(problem, here, np.clip(dx, -TUNING.longest_step, TUNING.longest_step))
         if there is None:
             break
-        found = _scattered_at(problem, slopes, *there)
+        found = _with_scatter_at(problem, slopes, *there)
         if found is None:
             break
         place, slopes = found
         places.append(place)
     best = places[0]
     if len(places) > 1:
-        best = min(places, key=lambda f: left_of_means(problem, _reweighted_anew(problem, f))[0])
+        best = min(places, key=lambda f: ensemble_mean_misfit(problem, _reweighted_anew(problem, f))[0])
     if best.x != places[-1].x:
-        rescattered(problem, best)
+        with_ensemble_scatter(problem, best)
     return replace(part.moved_to(problem.again(best)), base=problem.again(part.base))
 
 
@@ -75,42 +75,42 @@ def _reweighted_anew(problem: Problem, fitted: Fitted) -> Fitted:
     return replace(fitted, blocks=tuple(b or old for b, old in zip(new, fitted.blocks, strict=True)))
 
 
-def in_shorter_steps(problem: Problem, fitted: Fitted) -> Fitted:
+def refined_by_ensemble_mean(problem: Problem, fitted: Fitted) -> Fitted:
     """A fit moved to where the mean of its neighbours in shorter steps is met best, under their scatter.
 
     As it was where runs do not scatter, and as far as it came where nothing can be simulated further on.
     """
     if not any(e.perturbed for e in problem.dataset):
         return fitted
-    rescattered(problem, fitted, TUNING.finer_parts)
+    with_ensemble_scatter(problem, fitted, TUNING.finer_parts)
     here = slopes = problem.again(fitted)
     for _ in range(TUNING.finer_steps):
-        dx = np.clip(step_of_means(problem.dataset, here.blocks), -TUNING.longest_step, TUNING.longest_step)
-        if promised(here.blocks, dx) < TUNING.least_gain:
+        dx = np.clip(ensemble_mean_step(problem.dataset, here.blocks), -TUNING.longest_step, TUNING.longest_step)
+        if predicted_gain(here.blocks, dx) < TUNING.least_gain:
             break
-        there = _scattered_at(problem, slopes, *_moved(here, dx), TUNING.finer_parts)
+        there = _with_scatter_at(problem, slopes, *_moved_by(here, dx), TUNING.finer_parts)
         if there is None:
             break
         here, slopes = there
     return here
 
 
-def promised(blocks: Sequence[ResidualBlock], dx: Array) -> float:
+def predicted_gain(blocks: Sequence[ResidualBlock], dx: Array) -> float:
     """Gain dx'A dx of a step to a minimum, noise units."""
     return float(sum(dx @ b.normal()[0] @ dx for b in blocks))
 
 
-def _onward(problem: Problem, old: Fitted, dx: Array) -> tuple[Sequence[float], Sequence[float]] | None:
+def _line_search(problem: Problem, old: Fitted, dx: Array) -> tuple[Sequence[float], Sequence[float]] | None:
     """Coordinates and time shifts (s) of a fit moved by dx, or a share of that which leaves less; None if none does.
 
     The whole way unless that leaves clearly more: the mean of runs is worth more than the one that happens to be there.
     """
     met: list[tuple[float, tuple[Sequence[float], Sequence[float]]]] = []
     for shares in ((TUNING.whole_step,), TUNING.other_steps):
-        begun = [_moved(old, share * dx) for share in shares]
+        begun = [_moved_by(old, share * dx) for share in shares]
         problem.made_ahead((r, old.candidates, x) for x, _ in begun for r in range(len(old.blocks)))
         for x, shifts in begun:
-            left, clocks = _met(problem, old.candidates, x, shifts)
+            left, clocks = _misfit_and_shifts(problem, old.candidates, x, shifts)
             met.append((left, (x, clocks)))
         if met[0][0] < old.left:
             return met[0][1]
@@ -120,7 +120,7 @@ def _onward(problem: Problem, old: Fitted, dx: Array) -> tuple[Sequence[float], 
     return best if least < old.left else None
 
 
-def _scattered_at(
+def _with_scatter_at(
     problem: Problem, slopes: Fitted, x: Sequence[float], shifts: Sequence[float], parts: int = 1
 ) -> tuple[Fitted, Fitted] | None:
     """A fit as it stands at x and these time shifts (s) under the scatter of runs there, and where its slopes are told.
@@ -130,30 +130,30 @@ def _scattered_at(
     """
     is_beside = problem.is_beside(x, slopes.x)
     there = (
-        _by_slopes_of(problem, slopes, x, shifts) if is_beside else linearised(problem, slopes.candidates, x, shifts)
+        _with_slopes_of(problem, slopes, x, shifts) if is_beside else linearised(problem, slopes.candidates, x, shifts)
     )
     if there is None:
         return None
-    rescattered(problem, there, parts)
+    with_ensemble_scatter(problem, there, parts)
     slopes = problem.again(slopes if is_beside else there)
-    return _by_slopes_of(problem, slopes, x, shifts) or there, slopes
+    return _with_slopes_of(problem, slopes, x, shifts) or there, slopes
 
 
-def _by_slopes_of(problem: Problem, near: Fitted, x: Sequence[float], shifts: Sequence[float]) -> Fitted | None:
+def _with_slopes_of(problem: Problem, near: Fitted, x: Sequence[float], shifts: Sequence[float]) -> Fitted | None:
     """A fit as it stands at x and these time shifts (s), by the slopes of another place; None if a run fails."""
     each = enumerate(zip(near.blocks, shifts, strict=True))
-    found = [problem.block(r, near.candidates, x, s, problem.effort.fine, b.plain_J) for r, (b, s) in each]
+    found = [problem.block(r, near.candidates, x, s, problem.effort.fine, b.unweighted_J) for r, (b, s) in each]
     blocks = tuple(b for b in found if b is not None)
     return Fitted(candidates=near.candidates, x=tuple(x), blocks=blocks) if len(blocks) == len(found) else None
 
 
-def _moved(old: Fitted, dx: Array) -> tuple[list[float], list[float]]:
+def _moved_by(old: Fitted, dx: Array) -> tuple[list[float], list[float]]:
     """Coordinates and time shifts (s) of a fit moved by dx."""
     x = np.clip(np.array(old.x) + dx, 0.0, 1.0)
-    return [float(v) for v in x], [b.shift + shift_of(b, x - np.array(old.x)) for b in old.blocks]
+    return [float(v) for v in x], [b.shift + time_shift_step(b, x - np.array(old.x)) for b in old.blocks]
 
 
-def _met(
+def _misfit_and_shifts(
     problem: Problem, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]
 ) -> tuple[float, Sequence[float]]:
     """What is left at a place, slopes aside, and its time shifts (s) moved to where they fit; infinite if it fails."""
@@ -164,30 +164,30 @@ def _met(
     return sum(b.normal()[2] for b in blocks), [b.shift for b in blocks]
 
 
-def rescattered(problem: Problem, fitted: Fitted, parts: int = 1) -> None:
+def with_ensemble_scatter(problem: Problem, fitted: Fitted, parts: int = 1) -> None:
     """Weigh the recordings by what runs at a fitted point scatter by, in `parts` of a step."""
     changes = problem.changes(fitted.candidates, fitted.x)
-    problem.made_scattered(changes, parts)
+    problem.simulate_ensembles(changes, parts)
     dataset = []
     for e, block in zip(problem.dataset, fitted.blocks, strict=True):
         plain = replace(e, signals=tuple(replace(s, weight=None) for s in e.signals), perturbed=())
-        dataset.append(weighted(plain, e.simulator.perturbed(changes, block.shift, parts)))
+        dataset.append(with_sample_weights(plain, e.simulator.perturbed(changes, block.shift, parts)))
     problem.with_noise_model(dataset)
 
 
-def left_of_means(problem: Problem, fitted: Fitted) -> tuple[float, float]:
+def ensemble_mean_misfit(problem: Problem, fitted: Fitted) -> tuple[float, float]:
     """Sum of squares that the mean of a fit's neighbours leaves, in all and before the impact alone.
 
     Under the noise and weights as they are held now. One run meets a recording well or badly by chance; the mean of
     seven much less so.
     """
     changes = problem.changes(fitted.candidates, fitted.x)
-    problem.made_scattered(changes)
+    problem.simulate_ensembles(changes)
     total = before = 0.0
     for e, block in zip(problem.dataset, fitted.blocks, strict=True):
-        perturbed = alike(e, e.simulator.perturbed(changes, block.shift), e.first_impact)
+        perturbed = neighbours_on_same_course(e, e.simulator.perturbed(changes, block.shift), e.first_impact)
         raw = [d for d in (e.raw(perturbed_run) for perturbed_run in perturbed) if np.all(np.isfinite(d))]
-        w = block.plain_residual
+        w = block.unweighted_residual
         if raw:
             w = w - e.marginalised(e.whitened(np.sum(raw, axis=0) / (1.0 + len(raw))))
         counts = heavy_tail(e, w) if problem.heavy_tailed else None
@@ -197,25 +197,25 @@ def left_of_means(problem: Problem, fitted: Fitted) -> tuple[float, float]:
     return total, before
 
 
-def along(block: ResidualBlock, e: Dataset, perturbed_run: Array) -> Array:
+def projected_gradient(block: ResidualBlock, e: Dataset, perturbed_run: Array) -> Array:
     """J'd of a deviation (n,), SI, with the recording's time shift taken out, (p,)."""
     d = block.counted(e.marginalised(e.whitened(perturbed_run)))
     return np.asarray(block.J.T @ d - (block.J.T @ block.slope) * float(block.slope @ d) / block.weight)
 
 
-def step_of_means(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock]) -> Array:
+def ensemble_mean_step(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock]) -> Array:
     """(D8), (p,)."""
     p = blocks[0].J.shape[1]
     A = sum((block.normal()[0] for block in blocks), SETTINGS.fit.linearisation.weak_prior * np.eye(p))
-    b = sum((pull_of_means(e, block) for e, block in zip(dataset, blocks, strict=True)), np.zeros(p))
+    b = sum((ensemble_mean_gradient(e, block) for e, block in zip(dataset, blocks, strict=True)), np.zeros(p))
     return np.asarray(np.linalg.solve(A, b))
 
 
-def pull_of_means(e: Dataset, block: ResidualBlock) -> Array:
+def ensemble_mean_gradient(e: Dataset, block: ResidualBlock) -> Array:
     """One recording's part of A dx of (D8), (p,)."""
     pull = block.normal()[1]
     return (
-        pull - np.mean([along(block, e, perturbed_run) for perturbed_run in e.perturbed], axis=0)
+        pull - np.mean([projected_gradient(block, e, perturbed_run) for perturbed_run in e.perturbed], axis=0)
         if e.perturbed
         else pull
     )

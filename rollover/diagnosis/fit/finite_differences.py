@@ -63,55 +63,59 @@ def adaptive_difference(
     it is.
     """
     candidates = at[0]
-    owner, chance = owner_of(candidates, k)[0], scattered_by(e)
+    owner, chance = owner_of(candidates, k)[0], ensemble_sum_of_squares(e)
     physical = owner.kind != "sensor"
     while True:
-        sides = _across(moved, at, k, fd_step)
+        sides = _two_sided_difference(moved, at, k, fd_step)
         if not sides:
             return None
-        if not _too_narrow(sides, candidates, k, chance, fd_step, widest):
+        if not _needs_wider_step(sides, candidates, k, chance, fd_step, widest):
             break
         fd_step *= 2.0
-    whole = _whole(sides)
+    whole = _central_difference(sides)
     (quiet, over), (loud, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
     # nothing at all on one side is where an effect ends, and no leap
     discontinuities = (
         physical and widest > 0.0 and 0.0 < TUNING.discontinuity_ratio * float(quiet @ quiet) < float(loud @ loud)
     )
     difference, over = (quiet, over) if discontinuities else (whole, sum(abs(over) for _, over in sides))
-    return (but_chance(e, difference, chance) if owner.is_narrow and widest > 0.0 else difference) / over
+    return (difference_beyond_chance(e, difference, chance) if owner.is_narrow and widest > 0.0 else difference) / over
 
 
-def wider(e: Dataset, moved: Callable[[Point], Array | None], at: Point, k: int, fd_step: float, widest: float) -> bool:
+def needs_wider_step(
+    e: Dataset, moved: Callable[[Point], Array | None], at: Point, k: int, fd_step: float, widest: float
+) -> bool:
     """Whether `adaptive_difference` goes on to twice this `fd_step`."""
-    sides = _across(moved, at, k, fd_step)
-    return bool(sides) and _too_narrow(sides, at[0], k, scattered_by(e), fd_step, widest)
+    sides = _two_sided_difference(moved, at, k, fd_step)
+    return bool(sides) and _needs_wider_step(sides, at[0], k, ensemble_sum_of_squares(e), fd_step, widest)
 
 
-def scattered_by(e: Dataset) -> float:
+def ensemble_sum_of_squares(e: Dataset) -> float:
     """Sum of squares that runs of a recording scatter by, whitened."""
     power = [float(np.sum(e.marginalised(e.whitened(perturbed_run)) ** 2)) for perturbed_run in e.perturbed]
     return float(np.mean(power)) if power else 0.0
 
 
-def looked_at(at: Point, k: int, fd_step: float) -> list[list[float]]:
+def stencil(at: Point, k: int, fd_step: float) -> list[list[float]]:
     """Coordinates a nudge of the k-th one to either side, within its range."""
-    step, value = fd_stepped(at[0], k, fd_step), at[1][k]
+    step, value = fd_step_of(at[0], k, fd_step), at[1][k]
     return [moved_to(at, k, end) for end in (max(value - step, 0.0), min(value + step, 1.0)) if end != value]
 
 
-def _across(moved: Callable[[Point], Array | None], at: Point, k: int, fd_step: float) -> list[tuple[Array, float]]:
+def _two_sided_difference(
+    moved: Callable[[Point], Array | None], at: Point, k: int, fd_step: float
+) -> list[tuple[Array, float]]:
     """What the prediction differs by to either side, (n,) whitened, and how far that is; but where it fails."""
-    there = [(moved((at[0], x)), x[k] - at[1][k]) for x in looked_at(at, k, fd_step)]
+    there = [(moved((at[0], x)), x[k] - at[1][k]) for x in stencil(at, k, fd_step)]
     return [(d, over) for d, over in there if d is not None]
 
 
-def _whole(sides: Sequence[tuple[Array, float]]) -> Array:
+def _central_difference(sides: Sequence[tuple[Array, float]]) -> Array:
     """The difference from one side to the other; of one side where the other fails."""
     return np.asarray(sum(np.sign(over) * d for d, over in sides))
 
 
-def _too_narrow(
+def _needs_wider_step(
     sides: Sequence[tuple[Array, float]],
     candidates: Sequence[Candidate],
     k: int,
@@ -122,11 +126,11 @@ def _too_narrow(
     """Whether chance hides what a nudge does, and twice as much may be taken."""
     if owner_of(candidates, k)[0].kind == "sensor" or 2.0 * fd_step > widest:
         return False
-    whole = _whole(sides)
+    whole = _central_difference(sides)
     return float(whole @ whole) < TUNING.least_signal * chance
 
 
-def but_chance(e: Dataset, d: Array, chance: float) -> Array:
+def difference_beyond_chance(e: Dataset, d: Array, chance: float) -> Array:
     """d sqrt(1 - chance/|d|^2) of samples after the impact: a difference (n,) of runs without what `chance` adds to it.
 
     Two runs that nobody could tell apart differ by so much; over the small steps of a narrow effect it is most of the
@@ -138,7 +142,9 @@ def but_chance(e: Dataset, d: Array, chance: float) -> Array:
     return found
 
 
-def in_time(e: Dataset, changes: Mapping[str, object], shift: float, raw: Array, later: float, *, both: bool) -> Array:
+def time_derivative(
+    e: Dataset, changes: Mapping[str, object], shift: float, raw: Array, later: float, *, both: bool
+) -> Array:
     """dy/dtau (n,) of a recording, SI, `raw` y at `shift`; none across a leap, on whichever side a sample was and is.
 
     Over `later` (s), to both sides where that costs no run.
@@ -154,7 +160,9 @@ def in_time(e: Dataset, changes: Mapping[str, object], shift: float, raw: Array,
     return np.nan_to_num(slope)
 
 
-def in_step(e: Dataset, first: Array, last: Array, slope: Array, read: Callable[[float], Array | None]) -> Array:
+def clock_aligned_difference(
+    e: Dataset, first: Array, last: Array, slope: Array, read: Callable[[float], Array | None]
+) -> Array:
     """y(d) - s d of (D13), (n,), SI; `last` is y(0), `first` y0, `slope` s, `read` gives y or None."""
     s = e.marginalised(e.whitened(slope))
     size, most = float(s @ s), SETTINGS.fit.linearisation.widest_shift * e.shift_prior
@@ -183,7 +191,7 @@ def ridge_at(at: Point, k: int) -> tuple[int, float] | None:
     return None if found is None else (k - own + found[0], found[1])
 
 
-def fd_stepped(candidates: Sequence[Candidate], k: int, fd_step: float) -> float:
+def fd_step_of(candidates: Sequence[Candidate], k: int, fd_step: float) -> float:
     """How far the k-th coordinate is moved where others are by `fd_step`."""
     owner, own = owner_of(candidates, k)
     return (
@@ -203,7 +211,7 @@ def beside(
     for r in use:
         yield r, candidates, x
         for k in range(first, len(x)):
-            for there in looked_at((candidates, x), k, fd_step):
+            for there in stencil((candidates, x), k, fd_step):
                 yield r, candidates, there
 
 

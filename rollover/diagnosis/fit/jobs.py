@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import beside
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.local_search import polish, timed
-from rollover.diagnosis.fit.model_variants import in_form, shaped
+from rollover.diagnosis.fit.local_search import polish, with_time_shift_search
+from rollover.diagnosis.fit.model_variants import in_other_form, with_fitted_shape
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.scan_jobs import serial_map
-from rollover.diagnosis.fit.threshold_scan import Stretch, traced
+from rollover.diagnosis.fit.threshold_scan import Stretch, with_threshold_traced
 from rollover.diagnosis.forward.failed_model import FailedModelError
 from rollover.system.processes import Children, Failure, begin_server, map_cases
 from rollover.system.writing import scratch
@@ -247,10 +247,14 @@ def work(problem: Problem, task: Task) -> Fitted | None:
         return None
     leaves = [b.total for b in begun.blocks] if task.leaves is None else task.leaves
     if task.how == "shape":
-        return shaped(problem, begun, leaves) if task.form is None else in_form(problem, begun, task.form, leaves)
+        return (
+            with_fitted_shape(problem, begun, leaves)
+            if task.form is None
+            else in_other_form(problem, begun, task.form, leaves)
+        )
     if task.stretch is not None:
-        return traced(problem, begun, task.stretch)
-    ways: dict[str, Callable[[Problem, Fitted], Fitted | None]] = {"polish": polish, "time": timed}
+        return with_threshold_traced(problem, begun, task.stretch)
+    ways: dict[str, Callable[[Problem, Fitted], Fitted | None]] = {"polish": polish, "time": with_time_shift_search}
     return ways[task.how](problem, begun)
 
 
@@ -327,7 +331,7 @@ def linearised(
     use = range(len(shifts)) if recordings is None else recordings
     fd_step = 0.0 if no_jacobian else problem.effort.fine
     if not no_jacobian:
-        problem.made_beside(use, candidates, x, shifts, fd_step)
+        problem.simulate_neighbourhood(use, candidates, x, shifts, fd_step)
     for r, shift in zip(use, shifts, strict=True):
         block = problem.block(r, candidates, x, shift, fd_step)
         if block is None:

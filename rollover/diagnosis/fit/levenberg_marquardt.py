@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cache import NONE, Simulations
 from rollover.diagnosis.fit.finite_differences import Point, adaptive_difference, moved_to, ridge_at, step_reduced
-from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, bounded, shift_of, total_of
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, bounded_step, time_shift_step, total_of
 from rollover.diagnosis.fit.parameterisation import Candidate, key_at
 from rollover.diagnosis.noise.ensemble import heavy_tail
-from rollover.diagnosis.noise.truncation import soon
+from rollover.diagnosis.noise.truncation import shortly_after_impact
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
@@ -44,10 +44,10 @@ class Problem(Simulations):
         self.measured = [e.measured() for e in self.dataset]
 
     def near(self) -> Problem:
-        """One that sees of the same recordings what comes `soon`; itself where none goes on long after its impact."""
+        """One that sees of the same recordings what comes `shortly_after_impact`; itself where none goes on long."""
         if not self.effort.is_ensemble:
             return self
-        dataset = [soon(e) for e in self.dataset]
+        dataset = [shortly_after_impact(e) for e in self.dataset]
         if all(a is b for a, b in zip(dataset, self.dataset, strict=True)):
             return self
         if self._near is None or [e.count for e in self._near.dataset] != [e.count for e in dataset]:
@@ -70,7 +70,7 @@ class Problem(Simulations):
         for r, (b, e, cut) in enumerate(zip(base.blocks, self.dataset, near.dataset, strict=True)):
             both = zip(e.signals, cut.signals, strict=True)
             seen = np.concatenate([np.arange(s.rows.size) < short.rows.size for s, short in both])
-            blocks.append(near.block(r, base.candidates, base.x, b.shift, self.effort.fine, b.plain_J[seen]))
+            blocks.append(near.block(r, base.candidates, base.x, b.shift, self.effort.fine, b.unweighted_J[seen]))
         known = tuple(b for b in blocks if b is not None)
         return near, replace(base, blocks=known) if len(known) == len(blocks) else near.again(base)
 
@@ -92,7 +92,7 @@ class Problem(Simulations):
     def again(self, fitted: Fitted) -> Fitted:
         """A fit where it stands, linearised anew under the noise as it is held now."""
         fine, shifts = self.effort.fine, [b.shift for b in fitted.blocks]
-        self.made_beside(range(len(shifts)), fitted.candidates, fitted.x, shifts, fine)
+        self.simulate_neighbourhood(range(len(shifts)), fitted.candidates, fitted.x, shifts, fine)
         blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, fine) for r, b in enumerate(fitted.blocks)]
         kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
         return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
@@ -100,7 +100,7 @@ class Problem(Simulations):
     def recounted(self, fitted: Fitted) -> Fitted:
         """A fit where it stands by the slopes that it has, where nothing but what samples count has changed."""
         each = enumerate(fitted.blocks)
-        new = [self.block(r, fitted.candidates, fitted.x, b.shift, self.effort.fine, b.plain_J) for r, b in each]
+        new = [self.block(r, fitted.candidates, fitted.x, b.shift, self.effort.fine, b.unweighted_J) for r, b in each]
         return replace(fitted, blocks=tuple(b or old for b, old in zip(new, fitted.blocks, strict=True)))
 
     def is_beside(self, x: Sequence[float], there: Sequence[float]) -> bool:
@@ -147,7 +147,7 @@ class Problem(Simulations):
         clock = clock and self.effort.is_timed and not (self._fixed_shifts and e.recording.clock.zero != "unknown")
         slope = np.zeros_like(raw)
         if clock:
-            slope = self._in_time(r, candidates, x, shift, raw)
+            slope = self._time_derivative(r, candidates, x, shift, raw)
 
         worth = e.worth(discontinuities)
         residual = e.marginalised(worth * (self.measured[r] - y))
@@ -193,13 +193,13 @@ class Problem(Simulations):
         for _ in range(rounds):
             if self._fixed_shifts or found is None:
                 break
-            new = self.block(r, candidates, x, found.shift + shift_of(found, np.zeros(len(x))), 0.0)
+            new = self.block(r, candidates, x, found.shift + time_shift_step(found, np.zeros(len(x))), 0.0)
             if new is None or new.total >= found.total:
                 break
             found = new
         return found
 
-    def _on_trial(
+    def _trial_block(
         self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float
     ) -> ResidualBlock | None:
         """Recording r where a step leads: what is left there is all that is asked for, unless its clock moves on."""
@@ -207,7 +207,7 @@ class Problem(Simulations):
             return self.clocked(r, candidates, x, shift, self.effort.clocked)
         return self.block(r, candidates, x, shift, 0.0, clock=False)
 
-    def _less_far(
+    def _backtracked_shift(
         self,
         r: int,
         candidates: Sequence[Candidate],
@@ -276,7 +276,9 @@ class Problem(Simulations):
         shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
         fixed = len(x) - len(candidates[-1].search) if candidates else 0
         known: Sequence[Array | None] = [None] * len(use) if reused is None else reused
-        self.made_beside(use, candidates, x, shifts, fd_steps[width], 0 if reused is None else reused[0].shape[1])
+        self.simulate_neighbourhood(
+            use, candidates, x, shifts, fd_steps[width], 0 if reused is None else reused[0].shape[1]
+        )
         found = [
             self.block(r, candidates, x, s, fd_steps[width], J) for r, s, J in zip(use, shifts, known, strict=True)
         ]
@@ -297,28 +299,28 @@ class Problem(Simulations):
                 enough = max(enough, TUNING.converged_share * (best - sum(k.residual.size for k in blocks)))
             due = 0.0  # gain of a step by these slopes
             for _ in range(TUNING.step_retries):
-                dx = bounded(A, b, np.array(x), damping)
+                dx = bounded_step(A, b, np.array(x), damping)
                 trial = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
                 moved = np.array(trial) - np.array(x)
                 due = 2.0 * float(b @ moved) - float(moved @ A @ moved)
                 if width and due < max(TUNING.least_promise * least, TUNING.least_promise_far * enough):
                     break  # nothing more is to be had, by these slopes
-                steps = [shift_of(block, moved) for block in blocks]
+                steps = [time_shift_step(block, moved) for block in blocks]
                 self.made_ahead((r, candidates, trial) for r in use)
                 after = [
-                    self._on_trial(r, candidates, trial, block.shift + d)
+                    self._trial_block(r, candidates, trial, block.shift + d)
                     for r, block, d in zip(use, blocks, steps, strict=True)
                 ]
                 if all(a is not None for a in after):
                     total = total_of([a for a in after if a is not None])
                     if total >= best and not self.effort.clocked:
                         each = zip(use, blocks, after, strict=True)
-                        after = [self._less_far(r, candidates, trial, block, a) for r, block, a in each]
+                        after = [self._backtracked_shift(r, candidates, trial, block, a) for r, block, a in each]
                         total = total_of([a for a in after if a is not None])
                     if total < best:
                         improved = True
                         if total > TUNING.lengthen_above**2 * sum(k.residual.size for k in blocks):
-                            trial, after, total = self._further(use, candidates, x, trial, after, total)
+                            trial, after, total = self._extrapolated(use, candidates, x, trial, after, total)
                         break
                 damping = max(30.0 * damping, 1e-2)
             gain = best - total if improved else 0.0
@@ -346,10 +348,10 @@ class Problem(Simulations):
                 told = x
             borrowed = self.effort.is_ensemble and ((borrowed and not anew) or 0 < kept == len(x))
             if not has_no_jacobian:
-                self.made_beside(use, candidates, x, shifts, fd_step, kept)
+                self.simulate_neighbourhood(use, candidates, x, shifts, fd_step, kept)
             again = [
                 self.block(
-                    r, candidates, x, s, fd_step, None if not kept or has_no_jacobian else block.plain_J[:, :kept]
+                    r, candidates, x, s, fd_step, None if not kept or has_no_jacobian else block.unweighted_J[:, :kept]
                 )
                 for r, s, block in zip(use, shifts, blocks, strict=True)
             ]
@@ -361,13 +363,13 @@ class Problem(Simulations):
             if last:
                 break
         if width < len(fd_steps) and (borrowed or fd_steps[width] != self.effort.fine):
-            self.made_beside(use, candidates, x, shifts, self.effort.fine)
+            self.simulate_neighbourhood(use, candidates, x, shifts, self.effort.fine)
             ended = [self.block(r, candidates, x, s, self.effort.fine) for r, s in zip(use, shifts, strict=True)]
             if all(b is not None for b in ended):
                 blocks = [b for b in ended if b is not None]
         return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
 
-    def _further(
+    def _extrapolated(
         self,
         use: Sequence[int],
         candidates: Sequence[Candidate],
@@ -383,7 +385,9 @@ class Problem(Simulations):
             there = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
             self.made_ahead((r, candidates, there) for r in use)
             found = [
-                self._on_trial(r, candidates, there, b.shift) for r, b in zip(use, after, strict=True) if b is not None
+                self._trial_block(r, candidates, there, b.shift)
+                for r, b in zip(use, after, strict=True)
+                if b is not None
             ]
             if there == trial or any(b is None for b in found):
                 break
@@ -394,4 +398,4 @@ class Problem(Simulations):
         return trial, after, total
 
 
-__all__ = ["Fitted", "Problem", "ResidualBlock", "shift_of"]
+__all__ = ["Fitted", "Problem", "ResidualBlock", "time_shift_step"]

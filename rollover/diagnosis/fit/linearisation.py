@@ -52,24 +52,24 @@ class ResidualBlock:
         return values if self.heavy_tail is None else np.asarray((values.T * self.heavy_tail.samples).T)
 
     @property
-    def plain_residual(self) -> Array:
+    def unweighted_residual(self) -> Array:
         """Residual of samples that count in full."""
         return self.residual if self.heavy_tail is None else self.residual / self.heavy_tail.samples
 
     @property
-    def valued(self) -> Array:
+    def residual_for_squares(self) -> Array:
         """Residual whose squares add up to what is left."""
         if self.heavy_tail is None:
             return self.residual
-        return np.where(self.heavy_tail.late, np.sqrt(self.heavy_tail.share) * self.plain_residual, self.residual)
+        return np.where(self.heavy_tail.late, np.sqrt(self.heavy_tail.share) * self.unweighted_residual, self.residual)
 
     @property
-    def plain_J(self) -> Array:
+    def unweighted_J(self) -> Array:
         """J of samples that count in full."""
         return self.J if self.heavy_tail is None else self.J / self.heavy_tail.samples[:, None]
 
     @property
-    def plain_slope(self) -> Array:
+    def unweighted_slope(self) -> Array:
         """Slope of the shift of samples that count in full."""
         return self.slope if self.heavy_tail is None else self.slope / self.heavy_tail.samples
 
@@ -147,7 +147,7 @@ def total_of(blocks: Sequence[ResidualBlock]) -> float:
     return sum(b.total for b in blocks)
 
 
-def turned(fitted: Fitted) -> Fitted:
+def first_effect_last(fitted: Fitted) -> Fitted:
     """The same fit with its first effect last; a baseline stays where it is."""
     k = fitted.first
     held, first = (sum(len(c.search) for c in cs) for cs in (fitted.candidates[:k], fitted.candidates[k : k + 1]))
@@ -159,7 +159,7 @@ def turned(fitted: Fitted) -> Fitted:
     )
 
 
-def shift_of(block: ResidualBlock, dx: Array) -> float:
+def time_shift_step(block: ResidualBlock, dx: Array) -> float:
     """Change of the time shift that goes with dx; it stays within `widest_shift` of its prior."""
     g = float(block.slope @ (block.residual - block.J @ dx)) - block.shift * block.prior**-2
     most = TUNING.widest_shift * block.prior
@@ -171,7 +171,7 @@ def at_an_end(x: float) -> bool:
     return not 1e-6 < x < 1.0 - 1e-6
 
 
-def bounded(A: Array, b: Array, x: Array, damping: float) -> Array:
+def bounded_step(A: Array, b: Array, x: Array, damping: float) -> Array:
     """Step that solves (A + damping diag A) dx = b, coordinates that would leave the unit box held at its border."""
     p = x.size
     free = np.ones(p, dtype=bool)
@@ -192,7 +192,7 @@ def bounded(A: Array, b: Array, x: Array, damping: float) -> Array:
     return dx
 
 
-def without_shift(vectors: Array, block: ResidualBlock) -> Array:
+def without_shift_direction(vectors: Array, block: ResidualBlock) -> Array:
     """Vectors (n, m) without what the recording's time shift explains, given its prior."""
     s = block.slope
     shrink = (1.0 - np.sqrt(block.prior**-2 / block.weight)) / max(float(s @ s), 1e-300)

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import doubted_beside
+from rollover.diagnosis.data.dataset import with_uncertain_conditions_at
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
-from rollover.diagnosis.fit.parameterisation import Candidate, coordinate, each_with_own, physical
+from rollover.diagnosis.fit.parameterisation import Candidate, coordinate, physical, with_slices
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ def blocks_at(
     return blocks if len(blocks) == len(found) else None
 
 
-def by_what_is_left(
+def ranked_by_misfit(
     problem: Problem,
     candidates: Sequence[Candidate],
     places: Sequence[tuple[float, ...]],
@@ -109,7 +109,7 @@ def frequency_scan(last: Candidate, own: Sequence[float]) -> tuple[Candidate, li
     return whole, [(float(a), b, *map(float, shape)) for shape in shapes for a in firsts for b in TUNING.light_damping]
 
 
-def apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
+def separate_minima(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
     """Of places, each with what it leaves, the best that are not beside each other."""
     chosen: list[tuple[float, ...]] = []
     for _, x in sorted(met):
@@ -120,7 +120,7 @@ def apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, .
     return chosen
 
 
-def along_secondary(last: Candidate, x: Sequence[float]) -> list[tuple[float, ...]]:
+def starts_along_shape(last: Candidate, x: Sequence[float]) -> list[tuple[float, ...]]:
     """Places beside x all along each parameter of the shape of its last effect, the others as they usually are.
 
     A recording in which a face lets go, or does not, is met within a narrow stretch alone.
@@ -130,7 +130,7 @@ def along_secondary(last: Candidate, x: Sequence[float]) -> list[tuple[float, ..
     return [(*begun[:k], float(v), *begun[k + 1 :]) for k in range(at, len(begun)) for v in SCANNED]
 
 
-def least_of(
+def smallest_misfit(
     problem: Problem, thing: tuple[Sequence[Candidate], Sequence[tuple[float, ...]]], *, shifts: Sequence[float]
 ) -> tuple[float, tuple[float, ...]] | None:
     """What is left of all recordings at that of some places where it is least, and this; None if all runs fail."""
@@ -148,7 +148,7 @@ def least_of(
     return None if best is None else (least, best)
 
 
-def timed(problem: Problem, fitted: Fitted) -> Fitted:
+def with_time_shift_search(problem: Problem, fitted: Fitted) -> Fitted:
     """The fit with each time shift tried out to either side: edges make its slope crooked; never worse.
 
     Where one channel has a clock of its own all shifts are tried against that first: the edges of the channel stay.
@@ -183,7 +183,7 @@ def ended(problem: Problem, fitted: Fitted) -> Fitted:
 def _against(problem: Problem, fitted: Fitted) -> tuple[tuple[float, ...], list[float]]:
     """Coordinates, and time shifts (s) of all, moved against the clock of each channel that has one of its own."""
     best, left = (fitted.x, [b.shift for b in fitted.blocks]), fitted.total
-    for c, own in each_with_own(fitted.candidates):
+    for c, own in with_slices(fitted.candidates):
         if c.id != "sensor-clock-offset":
             continue
         k, step, search = own.start, TUNING.shift_step, c.search["offset"]
@@ -228,12 +228,12 @@ def _tried(
     return block
 
 
-def is_doubtful(problem: Problem) -> bool:
+def has_uncertain_conditions(problem: Problem) -> bool:
     """Whether conditions leave something uncertain whose work beside an effect is worth its runs."""
     return not problem.effort.is_ensemble and any(e.doubts is not None for e in problem.dataset)
 
 
-def conditioned(problem: Problem, fitted: Fitted) -> Fitted:
+def refitted_with_conditions(problem: Problem, fitted: Fitted) -> Fitted:
     """The fit again with what the conditions leave uncertain as it acts beside it, recordings weighed by that.
 
     What an error of a condition does was seen on the scenario as it is: a mass in doubt moves a spike there, and
@@ -242,33 +242,37 @@ def conditioned(problem: Problem, fitted: Fitted) -> Fitted:
     for _ in range(TUNING.condition_rounds):
         beside = problem.changes(fitted.candidates, fitted.x)
         shifts = [b.shift for b in fitted.blocks]
-        problem.with_noise_model([doubted_beside(e, beside, s) for e, s in zip(problem.dataset, shifts, strict=True)])
+        problem.with_noise_model(
+            [with_uncertain_conditions_at(e, beside, s) for e, s in zip(problem.dataset, shifts, strict=True)]
+        )
         again = problem.fit(fitted.candidates, fitted.x, shifts=shifts, width=1)
         fitted = again or problem.again(fitted)
     return fitted
 
 
-def few_of(f: Fitted) -> list[int]:
+def representative_recordings(f: Fitted) -> list[int]:
     """The recordings that a fit meets worst, best and in the middle."""
     ranked = sorted(range(len(f.blocks)), key=lambda r: f.blocks[r].normal()[2] / f.blocks[r].residual.size)
     return sorted({ranked[0], ranked[len(ranked) // 2], ranked[-1]})
 
 
-def shifts_told(shifts: Sequence[float], short: Fitted, few: Sequence[int]) -> tuple[float, ...]:
+def completed_shifts(shifts: Sequence[float], short: Fitted, few: Sequence[int]) -> tuple[float, ...]:
     """Time shifts (s) of all recordings: as fitted to the few that a short fit was made to, elsewhere as given."""
     told = {r: block.shift for r, block in zip(few, short.blocks, strict=True)}
     return tuple(told.get(r, s) for r, s in enumerate(shifts))
 
 
-def but_one(fitted: Fitted, k: int) -> tuple[list[Candidate], list[int]]:
+def all_but_one(fitted: Fitted, k: int) -> tuple[list[Candidate], list[int]]:
     """The effects of a fit but its k-th, and the places of their coordinates."""
-    others = [(c, own) for j, (c, own) in enumerate(each_with_own(fitted.candidates)) if j != k]
+    others = [(c, own) for j, (c, own) in enumerate(with_slices(fitted.candidates)) if j != k]
     return [c for c, _ in others], [at for _, own in others for at in range(own.start, own.stop)]
 
 
-def without(problem: Problem, fitted: Fitted, k: int, rounds: int = 8, *, no_jacobian: bool = False) -> Fitted | None:
+def without_effect(
+    problem: Problem, fitted: Fitted, k: int, rounds: int = 8, *, no_jacobian: bool = False
+) -> Fitted | None:
     """The explanation fitted again without its k-th effect; `no_jacobian` as in `Problem.fit`."""
-    rest, columns = but_one(fitted, k)
+    rest, columns = all_but_one(fitted, k)
     x, shifts = [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks]
-    reused = [b.plain_J[:, columns] for b in fitted.blocks] if problem.effort.is_ensemble else None
+    reused = [b.unweighted_J[:, columns] for b in fitted.blocks] if problem.effort.is_ensemble else None
     return problem.fit(rest, x, rounds=rounds, shifts=shifts, no_jacobian=no_jacobian, reused=reused)

@@ -10,7 +10,7 @@ import numpy as np
 
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
-from rollover.diagnosis.fit.local_search import by_what_is_left, few_of, polish, shifts_told
+from rollover.diagnosis.fit.local_search import completed_shifts, polish, ranked_by_misfit, representative_recordings
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.settings import SETTINGS
 
@@ -19,7 +19,7 @@ TUNING = SETTINGS.fit.model_variants
 BESIDE_FORM = np.linspace(TUNING.threshold_low, TUNING.threshold_high, TUNING.threshold_count)
 
 
-def shaped(problem: Problem, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
+def with_fitted_shape(problem: Problem, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
     """The fit with the shape of its last effect, begun where short fits from some places leave least; None if none.
 
     None too where these come nowhere near what another explanation `leaves` of each recording; so in another form. On
@@ -31,7 +31,7 @@ def shaped(problem: Problem, f: Fitted, leaves: Sequence[float]) -> Fitted | Non
     last, at = f.candidates[-1], len(f.x) - len(f.candidates[-1].search)
     along = replace(last.whole(), along=tuple(last.shapes))
     places = [(*f.x[:at], *start) for start in last.with_secondary(f.x[at:])]
-    found = _best_of(problem, f, along, places, leaves)
+    found = _best_from(problem, f, along, places, leaves)
     if found is None:
         return None
     if found.left > f.left:  # the few led to where the others are not met: all of them, from where the fit stands
@@ -49,7 +49,7 @@ def shaped(problem: Problem, f: Fitted, leaves: Sequence[float]) -> Fitted | Non
     return usual if usual.left < bent.left + enough(bent.left, sum(b.residual.size for b in bent.blocks)) else bent
 
 
-def in_form(problem: Problem, f: Fitted, last: Candidate, leaves: Sequence[float]) -> Fitted | None:
+def in_other_form(problem: Problem, f: Fitted, last: Candidate, leaves: Sequence[float]) -> Fitted | None:
     """The fit with its last effect in another form, begun where it leaves least.
 
     A threshold lies elsewhere in another form; what is fitted instead of another number is looked for over its range.
@@ -63,8 +63,8 @@ def in_form(problem: Problem, f: Fitted, last: Candidate, leaves: Sequence[float
             list(TUNING.new_places) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0]
         )
     places = [(*f.x[:at], *own) for own in itertools.product(*axes)]
-    met = by_what_is_left(problem, (*f.candidates[:-1], last), places, shifts, few_of(f))
-    found = _best_of(problem, f, last, met[: 2 * SETTINGS.fit.local_search.starts], leaves)
+    met = ranked_by_misfit(problem, (*f.candidates[:-1], last), places, shifts, representative_recordings(f))
+    found = _best_from(problem, f, last, met[: 2 * SETTINGS.fit.local_search.starts], leaves)
     return found if found is not None and found.left < _reach_of_all(f, leaves) else None
 
 
@@ -78,7 +78,7 @@ def is_noise(fitted: Fitted) -> bool:
     return fitted.left < SETTINGS.fit.levenberg_marquardt.noise_left**2 * sum(b.residual.size for b in fitted.blocks)
 
 
-def _best_of(
+def _best_from(
     problem: Problem, f: Fitted, last: Candidate, places: Sequence[tuple[float, ...]], leaves: Sequence[float]
 ) -> Fitted | None:
     """The best fit with another last effect from some places.
@@ -88,7 +88,7 @@ def _best_of(
     takes a part of that: a shape that is the right one does. What then comes nowhere near what another explanation
     `leaves` is returned as it stands.
     """
-    candidates, few = (*f.candidates[:-1], last), few_of(f)
+    candidates, few = (*f.candidates[:-1], last), representative_recordings(f)
     at = [f.blocks[r].shift for r in few]
     short = [
         problem.fit(candidates, x, rounds=TUNING.short_rounds, shifts=at, only=few, no_jacobian=True) for x in places
@@ -97,7 +97,9 @@ def _best_of(
     own = sum(f.blocks[r].total for r in few)
     most = min(
         TUNING.followed_misfit * own,
-        reach([leaves[r] for r in few], sum(f.blocks[r].residual.size for r in few), TUNING.short_excess),
+        largest_useful_misfit(
+            [leaves[r] for r in few], sum(f.blocks[r].residual.size for r in few), TUNING.short_excess
+        ),
     )
     if sum(leaves) > TUNING.much_left**2 * sum(b.residual.size for b in f.blocks):
         most = min(most, TUNING.shape_misfit * own)
@@ -105,13 +107,13 @@ def _best_of(
     for one in sorted((one for one in short if one is not None and one.total < most), key=lambda one: one.total):
         if begun and one.total > TUNING.followed_misfit * begun[0].total:
             break
-        if len(begun) < SETTINGS.fit.local_search.starts and not any(_is_there(one, other) for other in begun):
+        if len(begun) < SETTINGS.fit.local_search.starts and not any(_is_same_minimum(one, other) for other in begun):
             begun.append(one)
-    begun = [one for k, one in enumerate(begun) if not any(_is_one_ridge(one, other) for other in begun[:k])]
+    begun = [one for k, one in enumerate(begun) if not any(_is_same_ridge(one, other) for other in begun[:k])]
     held = [b.shift for b in f.blocks]
     again = [
         problem.fit(
-            candidates, one.x, shifts=shifts_told(held, one, few), rounds=TUNING.meeting_rounds, no_jacobian=True
+            candidates, one.x, shifts=completed_shifts(held, one, few), rounds=TUNING.meeting_rounds, no_jacobian=True
         )
         for one in begun
     ]
@@ -121,7 +123,7 @@ def _best_of(
     for one in sorted((one for one in again if one is not None), key=lambda one: one.total):
         if one.total > most:
             return best or one
-        if any(_is_there(one, other, TUNING.meeting_distance) for other in done) or (
+        if any(_is_same_minimum(one, other, TUNING.meeting_distance) for other in done) or (
             best and one.total > TUNING.followed_misfit * best.left
         ):
             continue
@@ -133,7 +135,7 @@ def _best_of(
     return best
 
 
-def reach(leaves: Sequence[float], size: int, part: float) -> float:
+def largest_useful_misfit(leaves: Sequence[float], size: int, part: float) -> float:
     """What a fit on its way may leave that is to meet as well as another, which `leaves` so much of each recording.
 
     As far again from the noise as that is, or `part` of the samples.
@@ -144,17 +146,17 @@ def reach(leaves: Sequence[float], size: int, part: float) -> float:
 
 def _reach_of_all(f: Fitted, leaves: Sequence[float]) -> float:
     """The same of a fit to all recordings that was gone on with."""
-    return reach(leaves, sum(b.residual.size for b in f.blocks), TUNING.followed_excess)
+    return largest_useful_misfit(leaves, sum(b.residual.size for b in f.blocks), TUNING.followed_excess)
 
 
-def _is_one_ridge(one: Fitted, other: Fitted) -> bool:
+def _is_same_ridge(one: Fitted, other: Fitted) -> bool:
     """Whether two short fits are on their way to one place, and as far."""
     return (
-        _is_there(one, other, TUNING.meeting_distance)
+        _is_same_minimum(one, other, TUNING.meeting_distance)
         and abs(one.total - other.total) < TUNING.same_misfit * other.total
     )
 
 
-def _is_there(one: Fitted, other: Fitted, within: float = TUNING.same_place) -> bool:
+def _is_same_minimum(one: Fitted, other: Fitted, within: float = TUNING.same_place) -> bool:
     """Whether two fits ended in one place."""
     return max(abs(a - b) for a, b in zip(one.x, other.x, strict=True)) < within

@@ -257,7 +257,7 @@ class Candidate:
         return [(coordinate(null, s) + sign * f,) for f in TUNING.clock_steps for sign in (1.0, -1.0)]
 
 
-def each_with_own(candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, slice]]:
+def with_slices(candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, slice]]:
     """Each of several candidates with where its own coordinates lie among those of all."""
     at = 0
     for c in candidates:
@@ -321,7 +321,7 @@ def strength_parameter(id: str, names: Collection[str]) -> tuple[str, float]:
     return next(iter(names)), 0.0
 
 
-def zero_of(c: Candidate) -> tuple[str, float | None]:
+def null_of(c: Candidate) -> tuple[str, float | None]:
     """The parameter of `strength_parameter` and its value at no effect, which the scenario may say; None if unknown."""
     name, null = strength_parameter(c.id, c.search)
     return name, c.own.get(name) if EFFECTS[c.id].null.get(name) is None else null
@@ -329,7 +329,7 @@ def zero_of(c: Candidate) -> tuple[str, float | None]:
 
 def is_limit(c: Candidate) -> bool:
     """Whether an effect is the stronger the lower its first parameter is, without a number at which it is none."""
-    name, zero = zero_of(c)
+    name, zero = null_of(c)
     return zero is None and name in LIMIT_NAMES
 
 

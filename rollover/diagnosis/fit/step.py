@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from rollover.diagnosis.fit.cross_validation import cross_validated, held_out, refitted
+from rollover.diagnosis.fit.cross_validation import cross_validated, cross_validated_by_refits, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
@@ -46,7 +46,9 @@ class Step:
         """The same with what its fits foretell by runs, where slopes do not hold for long; of drops its best alone."""
         if problem.effort.is_ensemble:
             return self._each(lambda f: cross_validated(problem, f, groups))
-        return self.moved_to(refitted(problem, self.fitted, groups, held_out(self.base, groups).total, parallel_map))
+        return self.moved_to(
+            cross_validated_by_refits(problem, self.fitted, groups, held_out(self.base, groups).total, parallel_map)
+        )
 
     def _each(self, made: Callable[[Fitted], Fitted]) -> Step:
         """The same with something made of each fit; its best stays one of its rivals."""

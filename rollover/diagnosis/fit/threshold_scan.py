@@ -8,8 +8,8 @@ import numpy as np
 
 from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.linearisation import Fitted, without_shift
-from rollover.diagnosis.fit.local_search import blocks_at, few_of, left_at
+from rollover.diagnosis.fit.linearisation import Fitted, without_shift_direction
+from rollover.diagnosis.fit.local_search import blocks_at, left_at, representative_recordings
 from rollover.diagnosis.fit.parameterisation import Candidate, followed, strength_parameter
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
@@ -23,7 +23,7 @@ CLOCKS = ("sensor-clock-offset", "sensor-clock-drift")
 Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to where it is tried
 
 
-def stretches(fitted: Fitted) -> list[Stretch]:
+def threshold_ranges(fitted: Fitted) -> list[Stretch]:
     """Where each threshold of the last effect may be tried: below where it was fitted, and above.
 
     That is each other parameter than the one that says how strong the effect is (`strength_parameter`); of a clock,
@@ -54,7 +54,7 @@ def has_threshold(c: Candidate) -> bool:
     return is_strength_known and any(null.get(name) is None for name in c.search)
 
 
-def placed_beside(
+def threshold_starts(
     problem: Problem,
     pair: tuple[Candidate, tuple[float, ...], Candidate],
     *,
@@ -74,24 +74,24 @@ def placed_beside(
     alone = Fitted(candidates=first, x=x, blocks=tuple(blocks))
     best, least = None, alone.total
     for place in second.probes():
-        there = _as_strong(problem, alone, second, (*x, *place), few)
+        there = _matched_strength(problem, alone, second, (*x, *place), few)
         left = None if there is None else left_at(problem, (*first, second), there, shifts, few)
         if left is not None and left < least:
             best, least = there, left
     return best
 
 
-def traced(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
+def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
     """The fit begun anew where its last effect acts elsewhere, as strongly as recordings ask for there; never worse.
 
     A threshold that moves past a sample leaves a misfit of many small valleys: it is tried all along its stretch, and
     finely beside the fit, on few recordings. What rings keeps its frequency meanwhile.
     """
     if fitted.candidates[-1].rings:
-        return _in_tune(problem, fitted, stretch)
+        return _along_frequency_valley(problem, fitted, stretch)
     last, shifts = fitted.candidates[-1], [b.shift for b in fitted.blocks]
     k, at = stretch[0], len(fitted.x) - len(fitted.own)
-    few = range(len(shifts)) if is_clock(fitted) else few_of(fitted)  # each has its own edges
+    few = range(len(shifts)) if is_clock(fitted) else representative_recordings(fitted)  # each has its own edges
     blocks = blocks_at(problem, fitted.candidates[:-1], fitted.x[:at], shifts, few)
     best = fitted
     if blocks is None:
@@ -100,17 +100,17 @@ def traced(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
     met = []
     for v in _places(fitted, stretch):
         there = (*fitted.x[:k], float(v), *fitted.x[k + 1 :])
-        x = there if is_clock(fitted) else _as_strong(problem, alone, last, there, few)
+        x = there if is_clock(fitted) else _matched_strength(problem, alone, last, there, few)
         left = None if x is None else left_at(problem, fitted.candidates, x, shifts, few)
         if x is not None and left is not None:
             met.append((left, x))
-    for x in _soonest(problem, fitted, _valleys(met)[: TUNING.valleys], few):
+    for x in _best_start(problem, fitted, _local_minima(met)[: TUNING.valleys], few):
         again = problem.fit(fitted.candidates, x, shifts=shifts, width=1)
         best = again if again is not None and again.left < best.left else best
     return best
 
 
-def _soonest(
+def _best_start(
     problem: Problem, fitted: Fitted, places: Sequence[tuple[float, ...]], few: Sequence[int]
 ) -> list[tuple[float, ...]]:
     """Of several places those from which a short fit to `few` recordings comes to less than one from where a fit is."""
@@ -123,16 +123,16 @@ def _soonest(
     return [one.x for one in short[1:] if one is not None and one.total < own]
 
 
-def _in_tune(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
+def _along_frequency_valley(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
     """The fit of what rings begun anew with another shape, along the valley of its frequency; never worse."""
     shifts, at = [b.shift for b in fitted.blocks], len(fitted.x) - len(fitted.own)
     bent, own = fitted.candidates[-1].bent(fitted.own)
     candidates, x = (*fitted.candidates[:-1], bent), (*fitted.x[:at], *own)
     there = [(*x[: stretch[0]], v, *x[stretch[0] + 1 :]) for v in _places(fitted, stretch)]
-    few = few_of(fitted)
+    few = representative_recordings(fitted)
     met = [(left, y) for y in there if (left := left_at(problem, candidates, y, shifts, few)) is not None]
     best = fitted
-    for y in _valleys(met)[: TUNING.valleys]:
+    for y in _local_minima(met)[: TUNING.valleys]:
         new = problem.fit(candidates, y, shifts=shifts, width=1)
         if new is not None:
             plain = (*new.x[:at], *bent.plain(new.own)[1])
@@ -147,7 +147,7 @@ def _places(fitted: Fitted, stretch: Stretch) -> list[float]:
     return sorted(float(v) for v in (*AFAR, *(fitted.x[k] + NEAR)) if low <= v <= high and 0.0 < v < 1.0)
 
 
-def _as_strong(
+def _matched_strength(
     problem: Problem, alone: Fitted, last: Candidate, x: tuple[float, ...], few: Sequence[int]
 ) -> tuple[float, ...] | None:
     """Coordinates x with the last effect as strong as recordings ask for beside the fit without it; None if none.
@@ -158,13 +158,13 @@ def _as_strong(
     for r, b in zip(few, alone.blocks, strict=True):
         way = problem.moved(r, (alone.candidates, alone.x), ((*alone.candidates, last), x), b.shift)
         if way is not None:
-            d = without_shift(way[:, None], b)[:, 0]
+            d = without_shift_direction(way[:, None], b)[:, 0]
             along, size = along + float(d @ b.residual), size + float(d @ d)
     start = followed(last, x[len(alone.x) :], along / size) if size > 0.0 else None
     return None if start is None else (*alone.x, *start)
 
 
-def _valleys(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
+def _local_minima(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
     """Places of a row, each with what it leaves, beside which none leaves less; the one that leaves least first."""
     inside = [(np.inf, ()), *met, (np.inf, ())]
     low = [b for a, b, c in zip(inside, inside[1:], inside[2:], strict=False) if b[0] <= min(a[0], c[0])]

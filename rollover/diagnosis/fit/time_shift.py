@@ -7,7 +7,7 @@ what they have changed since the start, and none later than `early_window`.
 It is sought before by what hardly asks for a model: until then a body falls, then it does something else (`onset`).
 
 A clock that is off by far more than it is said to be leaves a recording that nothing explains, and that meets the
-simulation at another time altogether (`mistimed`).
+simulation at another time altogether (`clock_outliers`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.data.onset import first_shown
+from rollover.diagnosis.data.onset import onset_delay
 from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
@@ -44,7 +44,7 @@ def align(problem: Problem) -> None:
         problem.shifts[r] = problem.shifts[r] if found is None else found
 
 
-def by_first_contact(
+def shifts_from_contact(
     problem: Problem, candidates: Sequence[Candidate], x: Sequence[float], parallel_map: ParallelMap = serial_map
 ) -> list[float | None]:
     """Time shift (s) of each recording by its first contact; None where nothing comes of it."""
@@ -54,7 +54,7 @@ def by_first_contact(
 def _by_contact(problem: Problem, r: int, *, beside: Point) -> float | None:
     # leaps as they are: these are what tells the time
     e = problem.dataset[r]
-    at = _first_contact(problem, r, partial(problem.edged, r, *beside))
+    at = _first_contact(problem, r, partial(problem.predicted_with_jumps, r, *beside))
     known = e.recording.clock.zero != "unknown"
     return None if at is None or (known and abs(at) > TUNING.believed_width * e.shift_prior) else at
 
@@ -68,7 +68,7 @@ def _first_contact(problem: Problem, r: int, made: Made) -> float | None:
     if not (np.isfinite(e.simulator.contact) and places.size):
         return None
     about = _best(problem, r, made, partial(onset, problem, r), places)
-    if about is None or not _falls(problem, r, made(about), about):
+    if about is None or not _is_free_fall(problem, r, made(about), about):
         return None
     at = _best(
         problem,
@@ -82,23 +82,23 @@ def _first_contact(problem: Problem, r: int, made: Made) -> float | None:
     )  # the model leads away from it
 
 
-def mistimed(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> list[tuple[str, float]]:
+def clock_outliers(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> list[tuple[str, float]]:
     """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by."""
     if not problem.effort.is_timed:
         return []
-    found = parallel_map(problem, partial(_elsewhere, fitted=fitted), range(len(problem.dataset)))
+    found = parallel_map(problem, partial(_distant_shift, fitted=fitted), range(len(problem.dataset)))
     return [(e.name, at) for e, at in zip(problem.dataset, found, strict=True) if at is not None]
 
 
-def is_all_by_clocks(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> bool:
+def is_explained_by_clocks(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> bool:
     """Whether such shifts are all that separates the recordings from a fit: each else is met as it stands."""
-    late = {name for name, _ in mistimed(problem, fitted, parallel_map)}
+    late = {name for name, _ in clock_outliers(problem, fitted, parallel_map)}
     others = [b for e, b in zip(problem.dataset, fitted.blocks, strict=True) if e.name not in late]
     return bool(late) and all(b.normal()[2] < TUNING.accepted_power * b.residual.size for b in others)
 
 
-def by_clock(found: Sequence[tuple[str, float]]) -> str:
-    """What of `mistimed` stands behind the verdict."""
+def clock_evidence(found: Sequence[tuple[str, float]]) -> str:
+    """What of `clock_outliers` stands behind the verdict."""
     each = [f"{spoken(abs(s) * 1e3)} ms {'late' if s > 0.0 else 'early'} ({name})" for name, s in found]
     if not each:
         return ""
@@ -109,7 +109,7 @@ def by_clock(found: Sequence[tuple[str, float]]) -> str:
     )
 
 
-def _elsewhere(problem: Problem, r: int, *, fitted: Fitted) -> float | None:
+def _distant_shift(problem: Problem, r: int, *, fitted: Fitted) -> float | None:
     """Time shift (s), however large, at which recording r meets a fit far better than where it stands; None if none.
 
     Beside that it is met far worse: what rests long before and after is met by any clock in most of its samples.
@@ -128,11 +128,11 @@ def _elsewhere(problem: Problem, r: int, *, fitted: Fitted) -> float | None:
         partial(_left, e),
         np.arange(-TUNING.largest_error, TUNING.largest_error, min(e.shift_prior, TUNING.no_physics)),
     )
-    shown = [at for at in first_shown(e) if abs(at) > TUNING.no_physics] if falls else []
+    shown = [at for at in onset_delay(e) if abs(at) > TUNING.no_physics] if falls else []
     starts = [*([] if about is None else [about]), *shown]
     if not starts:
         return None
-    there, least = min((_lowest(left, start, e.shift_prior) for start in starts), key=lambda found: found[1])
+    there, least = min((_local_minimum(left, start, e.shift_prior) for start in starts), key=lambda found: found[1])
     here = left(fitted.blocks[r].shift)
     bound = max(
         min(TUNING.accepted_power, here / TUNING.least_improvement),
@@ -146,7 +146,7 @@ def _elsewhere(problem: Problem, r: int, *, fitted: Fitted) -> float | None:
     return there
 
 
-def _lowest(left: Callable[[float], float], start: float, width: float) -> tuple[float, float]:
+def _local_minimum(left: Callable[[float], float], start: float, width: float) -> tuple[float, float]:
     """Time shift (s) beside a first one that leaves least, and what it leaves."""
     from scipy.optimize import minimize_scalar
 
@@ -221,7 +221,7 @@ def onset(problem: Problem, r: int, raw: Array, shift: float) -> float:
     return total
 
 
-def _falls(problem: Problem, r: int, raw: Array | None, shift: float) -> bool:
+def _is_free_fall(problem: Problem, r: int, raw: Array | None, shift: float) -> bool:
     """Whether what recording r shows before its contact, `shift` (s) late, is a fall: it may have begun too late."""
     e = problem.dataset[r]
     if raw is None:

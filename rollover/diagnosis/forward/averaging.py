@@ -99,7 +99,7 @@ class Averaged:
         return self.inner.effort
 
 
-def on_one_branch(scenario: Scenario, recording: Recording) -> tuple[Recording, Recording | None]:
+def on_attitude_branch(scenario: Scenario, recording: Recording) -> tuple[Recording, Recording | None]:
     """The recording with its attitude on the branch of its simulation, and the attitude of that; None without any.
 
     Raises `InputError`.
@@ -112,8 +112,8 @@ def on_one_branch(scenario: Scenario, recording: Recording) -> tuple[Recording, 
 
 
 def compared(scenario: Scenario, recording: Recording) -> tuple[Recording, Recording, Simulator, int]:
-    """The recording `on_one_branch`, and it as it is `simulated`. Raises `InputError`."""
-    recording, reference = on_one_branch(scenario, recording)
+    """The recording `on_attitude_branch`, and it as it is `simulated`. Raises `InputError`."""
+    recording, reference = on_attitude_branch(scenario, recording)
     return recording, *simulated(scenario, recording, reference)
 
 
@@ -127,9 +127,9 @@ def simulated(
     is_drop = isinstance(scenario.initiation, Drop)
     # of a full run it is not the rows that cost
     classes = () if is_drop else tuple(recording.cfc.values())
-    thin, inside = thinned(recording, max(map(least_rate, classes), default=0.0))
+    thin, inside = block_averaged(recording, max(map(least_rate, classes), default=0.0))
     if inside is None:
-        return recording, referred(simulator_of(scenario, recording), reference), 1
+        return recording, with_reference_attitude(simulator_of(scenario, recording), reference), 1
     many = inside.shape[1]
     # a filter needs all stamps, and so does the kink of the force at the first contact
     near = TUNING.unknown_zero_error if recording.clock.zero == "unknown" else TUNING.known_zero_error
@@ -145,11 +145,11 @@ def simulated(
     channels = {c: v[at] for c, v in recording.channels.items()}  # which there are is all that is asked of them
     part = replace(recording, time=np.concatenate(stamps), channels=channels)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    inner = referred(simulator_of(scenario, part, discontinuities=False), reference)
+    inner = with_reference_attitude(simulator_of(scenario, part, discontinuities=False), reference)
     return thin, Averaged(inner=inner, starts=starts, counts=counts, many=many), many
 
 
-def referred(simulator: Simulator, reference: Recording | None) -> Simulator:
+def with_reference_attitude(simulator: Simulator, reference: Recording | None) -> Simulator:
     """The simulator itself, its full runs with their attitude beside a `reference`."""
     runs = full_runs(simulator)
     if runs is not None:
@@ -157,7 +157,7 @@ def referred(simulator: Simulator, reference: Recording | None) -> Simulator:
     return simulator
 
 
-def thinned(recording: Recording, slowest: float = 0.0) -> tuple[Recording, NDArray[np.int64] | None]:
+def block_averaged(recording: Recording, slowest: float = 0.0) -> tuple[Recording, NDArray[np.int64] | None]:
     """The recording at no more than `most_rows` rows, means of neighbours, none across a gap, and which these are.
 
     (rows, many), None where there are few enough as it is, or would be fewer than `slowest` asks for, Hz. What is

@@ -25,7 +25,7 @@ BESIDE = TUNING.neighbours  # samples to either side, between whose values one a
 
 
 @compiled
-def about_discontinuities(y: Any, least: Any, first: Any, last: Any) -> Any:
+def near_discontinuity(y: Any, least: Any, first: Any, last: Any) -> Any:
     """Whether a stack y (n,) leaps about each sample, over two samples by more than `least` (n,) from the first.
 
     `first` and `last` (n,) are the ends of the signal of each sample.
@@ -44,7 +44,7 @@ def about_discontinuities(y: Any, least: Any, first: Any, last: Any) -> Any:
 
 
 @compiled
-def about_jumps(times: Any, jumps: Any, sizes: Any) -> Any:
+def largest_jump_nearby(times: Any, jumps: Any, sizes: Any) -> Any:
     """How far jumps at instants (j,) of `sizes` (j,) go between each of `times` (n,) and those beside it, the most."""
     found = np.zeros(times.size)
     for k in range(jumps.size):
@@ -69,7 +69,7 @@ def within_means(values: Any, mean: Any, sizes: Any) -> None:
 
 
 @compiled
-def beside_discontinuities(discontinuities: Any, last: Any, orders: Any, gains: Any) -> Any:
+def weights_after_discontinuities(discontinuities: Any, last: Any, orders: Any, gains: Any) -> Any:
     """Weights (n,) of whitened samples: those after leaps, as many as the noise remembers, have `gains`, all others 1.
 
     A leap itself counts in full. `last`, `orders` (how many) and `gains` (n,) are those of the signal of each sample.

@@ -60,7 +60,7 @@ def rows_of(recording: Recording) -> Rows:
     return Rows(times=times, stamps=back[: stamps.size], even=back[stamps.size :], step=fine)
 
 
-def behind_filters(channels: Mapping[str, Array], recording: Recording, rows: Rows) -> dict[str, Array]:
+def filtered_like(channels: Mapping[str, Array], recording: Recording, rows: Rows) -> dict[str, Array]:
     """Simulated channels (m,) that the recording has, at its stamps, each through the filter class that it states."""
     found = {}
     for name in recording.channels:

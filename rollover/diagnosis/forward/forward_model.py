@@ -10,8 +10,8 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, about_jumps
-from rollover.diagnosis.forward.filtering import Rows, behind_filters, rows_of
+from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, largest_jump_nearby
+from rollover.diagnosis.forward.filtering import Rows, filtered_like, rows_of
 from rollover.diagnosis.forward.full_run import SENSORS, RunSimulator
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
@@ -100,7 +100,7 @@ class DropSimulator:
                 channels = dict(read({n: e for n, e in sensors.items() if e.id not in EDGES}, run).channels)
         except DropFailedError:
             return None
-        found = behind_filters(channels, self.recording, self.rows)
+        found = filtered_like(channels, self.recording, self.rows)
         return found | self._discontinuities(physical, shift, sensors) if self.discontinuities else found
 
     def perturbed(
@@ -139,7 +139,7 @@ class DropSimulator:
         lags, *clocks = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
         made = channels_of(rows, self._sharp.difference(lags))
         return {
-            DISCONTINUITY_IN + name: about_jumps(_own(time, name, *clocks) - shift, instants, sizes)
+            DISCONTINUITY_IN + name: largest_jump_nearby(_own(time, name, *clocks) - shift, instants, sizes)
             for name, sizes in made.items()
             if sizes.any()
         }

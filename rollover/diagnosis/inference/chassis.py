@@ -28,7 +28,7 @@ ALONG, ABOUT = "chassis/acceleration_", "chassis/angular_velocity_"
 TUNING = SETTINGS.inference.chassis
 
 
-def degrees_of(
+def misfit_by_degree_of_freedom(
     scenarios: Sequence[Scenario], dataset: Sequence[Dataset], shifts: Sequence[float]
 ) -> tuple[Degree, ...]:
     """Degrees of freedom of the chassis by their share of the misfit, largest first.
@@ -49,7 +49,7 @@ def degrees_of(
             time, off = e.recording.time[s.rows], s.values - predicted[s.channel][s.rows]
             name = f"{'along' if s.channel.startswith(ALONG) else 'about'} {axis}"
             k = AXES.index(axis)
-            force = body.mass * off if name.startswith("along") else body.inertia[k] * _rate(off, time)
+            force = body.mass * off if name.startswith("along") else body.inertia[k] * _derivative(off, time)
             forces.setdefault(name, []).append(force)
             worth[name] = worth.get(name, 0.0) + _worth(s, off)
     total = sum(worth.values())
@@ -70,7 +70,7 @@ def _worth(s: Signal, off: Array) -> float:
     return max(float(np.sum((weight * off / s.sigma) ** 2) - np.sum(weight**2)), 0.0)
 
 
-def _rate(values: Array, time: Array) -> Array:
+def _derivative(values: Array, time: Array) -> Array:
     """Derivative by a smoothing polynomial of second order."""
     from scipy.signal import savgol_filter
 

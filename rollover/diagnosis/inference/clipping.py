@@ -26,7 +26,7 @@ TUNING = SETTINGS.inference.clipping
 Found = dict[str, list[tuple[int, Finding]]]
 
 
-def cut_off(
+def clipped_channels(
     names: Sequence[str], recordings: Sequence[Recording], phases: Sequence[Sequence[tuple[float, str]]]
 ) -> tuple[tuple[Named, ...], tuple[Place, ...]]:
     """Channels that end at one value in two recordings or more, that most show first, and where they do."""

@@ -28,7 +28,7 @@ def coarse(dataset: Sequence[Dataset], phases: Sequence[Sequence[tuple[float, st
     return tuple(whole(e, s, phases[r], 1.0 / len(rough)) for r, e, s in rough)
 
 
-def by_digits(places: Sequence[Place], dataset: Sequence[Dataset]) -> str:
+def digit_sentence(places: Sequence[Place], dataset: Sequence[Dataset]) -> str:
     """The sentence on what digits make of recordings."""
     steps = {s.channel: s.step for e in dataset for s in e.signals if s.channel in {p.channel for p in places}}
     said = " and ".join(f"{c} in steps of {spoken(step)} {describe(c).unit}" for c, step in steps.items())

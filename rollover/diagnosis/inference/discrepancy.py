@@ -63,11 +63,11 @@ def posterior(left: float, draws: float = TUNING.draws) -> tuple[float, float]:
     return float(SCALES[best]), float(np.log(np.sum(np.exp(log_p - log_p[best]))) + log_p[best])
 
 
-def left_beyond_noise(problem: Problem, fitted: Fitted) -> dict[str, float]:
+def residual_rms(problem: Problem, fitted: Fitted) -> dict[str, float]:
     """Root mean square that a fit leaves of each channel after first contact beyond noise, a share of its range."""
     found: dict[str, list[float]] = {}
     for e, residual in zip(problem.dataset, problem.residuals(fitted), strict=True):
-        residual = without_doubts(e, residual)
+        residual = without_condition_errors(e, residual)
         for s, part in e.spans():
             after = e.recording.time[s.rows] >= e.simulator.contact
             if after.any():
@@ -76,7 +76,7 @@ def left_beyond_noise(problem: Problem, fitted: Fitted) -> dict[str, float]:
     return {channel: float(np.sqrt(np.mean(powers))) for channel, powers in found.items()}
 
 
-def without_doubts(e: Dataset, residual: Array) -> Array:
+def without_condition_errors(e: Dataset, residual: Array) -> Array:
     """A misfit (n,), SI, without what uncertain conditions make of it at their most probable values."""
     if e.doubts is None:
         return residual
@@ -91,7 +91,7 @@ def estimated(problem: Problem, base: Fitted, tried: Sequence[Fitted]) -> Discre
     Which explanation is right every recording tells anew; how far it misses is told by the rig, once for all of them.
     """
     models = [base, *tried]
-    left = [left_beyond_noise(problem, m) for m in models]
+    left = [residual_rms(problem, m) for m in models]
     told = [{c: posterior(v) for c, v in one.items()} for one in left]
     score = len(problem.dataset) * np.array([sum(v for _, v in one.values()) for one in told])
     weight = np.exp(score - score.max())
@@ -104,9 +104,9 @@ def estimated(problem: Problem, base: Fitted, tried: Sequence[Fitted]) -> Discre
     return Discrepancy(scales=scales, times=times, by_none=left[0], is_estimated=True)
 
 
-def taught(problem: Problem, base: Fitted) -> Discrepancy | None:
+def learned_from_references(problem: Problem, base: Fitted) -> Discrepancy | None:
     """The discrepancy of recordings in which nothing is missing, a draw each; None if noise hides it everywhere."""
-    left = left_beyond_noise(problem, base)
+    left = residual_rms(problem, base)
     scales = {c: posterior(v, TUNING.draws * len(problem.dataset))[0] for c, v in left.items()}
     hidden = {
         s.channel
@@ -121,7 +121,7 @@ def correlation_times(problem: Problem, fitted: Fitted) -> dict[str, float]:
     """Time (s) over which what a fit leaves of each channel is one error: by its lag of half the correlation, (D19)."""
     found: dict[str, list[float]] = {}
     for e, residual in zip(problem.dataset, problem.residuals(fitted), strict=True):
-        residual = without_doubts(e, residual)
+        residual = without_condition_errors(e, residual)
         for s, part in e.spans():
             time = e.recording.time[s.rows]
             v = residual[part][time >= e.simulator.contact]
@@ -136,6 +136,6 @@ def correlation_times(problem: Problem, fitted: Fitted) -> dict[str, float]:
     return {channel: float(np.median(times)) for channel, times in found.items()}
 
 
-def beside(every: Sequence[Dataset], found: Discrepancy) -> list[Dataset]:
+def with_discrepancy(every: Sequence[Dataset], found: Discrepancy) -> list[Dataset]:
     """The evidence with a discrepancy of these scales and correlation times by channel."""
     return [replace(e, discrepancy=dict(found.scales), memory=dict(found.times)) for e in every]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
 from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
-from rollover.diagnosis.fit.time_shift import by_first_contact
+from rollover.diagnosis.fit.time_shift import shifts_from_contact
 from rollover.diagnosis.inference.bases import ACCELERATION, DEPTH, SPEED, TIME, linear_b_splines
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
 from rollover.diagnosis.inference.residual_force import WHERES, Descent, Where, channels_of, descent
@@ -92,8 +92,8 @@ def dependence(
 ) -> Dependence:
     """What is left beside a fit depends on what; `scenarios` under the conditions of the recordings."""
     dataset = problem.dataset
-    blocks, found = ways(problem, scenarios, base, parallel_map)
-    channel = alone(dataset, blocks, found)
+    blocks, found = loading_paths(problem, scenarios, base, parallel_map)
+    channel = single_faulty_channel(dataset, blocks, found)
     if channel is not None:
         return Dependence(shares=_added(*_of_channel(channel, problem, base)), channel=channel)
     return Dependence(shares=_added(*_of_forces(problem, found, parallel_map))) if found else Dependence()
@@ -114,18 +114,18 @@ def dependence_of_one(problem: Problem, base: Fitted, before: Mismatch) -> Depen
     return Dependence(shares=_added(*_of_channel(most, problem, base)), channel=most)
 
 
-def ways(
+def loading_paths(
     problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap = serial_map
 ) -> tuple[list[list[ResidualBlock]], list[Descent]]:
     """Each recording at some time shifts, and its way down at the best of them."""
-    told = by_first_contact(problem, base.candidates, base.x, parallel_map)
+    told = shifts_from_contact(problem, base.candidates, base.x, parallel_map)
     found = parallel_map(
-        problem, partial(_way, base=base), list(zip(range(len(scenarios)), scenarios, told, strict=True))
+        problem, partial(_loading_path, base=base), list(zip(range(len(scenarios)), scenarios, told, strict=True))
     )
     return [blocks for blocks, _ in found], [best for _, best in found if best is not None]
 
 
-def _way(
+def _loading_path(
     problem: Problem, one: tuple[int, Scenario, float | None], *, base: Fitted
 ) -> tuple[list[ResidualBlock], Descent | None]:
     """A recording's blocks at some time shifts, and its way down at the best of them.
@@ -150,7 +150,7 @@ def _way(
     return blocks, best
 
 
-def alone(
+def single_faulty_channel(
     dataset: Sequence[Dataset], blocks: Sequence[Sequence[ResidualBlock]], found: Sequence[Descent]
 ) -> str | None:
     """The channel without which nothing is left to explain, if there is one and no force does as well."""
@@ -175,7 +175,7 @@ def _left(b: ResidualBlock, rows: NDArray[np.bool_]) -> float:
     return float(w @ w) + (b.shift / b.prior) ** 2 - g * g / (float(s @ s) + b.prior**-2)
 
 
-def without_shifts(w: Array, slope: Array, prior: float) -> Array:
+def without_shift_directions(w: Array, slope: Array, prior: float) -> Array:
     """A misfit (n,) or columns (n, k) without what the recording's time shift explains."""
     s = slope / np.sqrt(float(slope @ slope) + prior**-2)
     return np.asarray(w - np.outer(s, s @ w) if w.ndim > 1 else w - s * float(s @ w))
@@ -185,7 +185,7 @@ def _of_forces(
     problem: Problem, found: Sequence[Descent], parallel_map: ParallelMap
 ) -> tuple[list[Model], list[Array], float, float]:
     """Every model of a force, the misfits, the noise's part of them, and phi."""
-    misfits = [without_shifts(d.residual[d.rows], d.slope[d.rows], d.prior) for d in found]
+    misfits = [without_shift_directions(d.residual[d.rows], d.slope[d.rows], d.prior) for d in found]
     strength = [(d.way.force / float(d.way.force.max()))[:, None] for d in found]
     models: list[Model] = []
     for where in WHERES:
@@ -222,7 +222,7 @@ def _felt(problem: Problem, forced: tuple[Descent, Array], *, where: Where) -> A
     del problem
     d, forces = forced
     J = channels_of(d.way, d.way.moved(forces * float(d.way.force.max()), where), d.dataset, d.shift)[d.rows]
-    return without_shifts(J, d.slope[d.rows], d.prior)
+    return without_shift_directions(J, d.slope[d.rows], d.prior)
 
 
 def _of_channel(channel: str, problem: Problem, base: Fitted) -> tuple[list[Model], list[Array], float, float]:

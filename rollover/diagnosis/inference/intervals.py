@@ -10,12 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.ensemble_mean import along, left_of_means, pull_of_means, step_of_means
+from rollover.diagnosis.fit.ensemble_mean import (
+    ensemble_mean_gradient,
+    ensemble_mean_misfit,
+    ensemble_mean_step,
+    projected_gradient,
+)
 from rollover.diagnosis.fit.jobs import linearised
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import ResidualBlock, at_an_end, shift_of
-from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own, physical
-from rollover.diagnosis.inference.local_quadratic import by_student, over_roughness
+from rollover.diagnosis.fit.linearisation import ResidualBlock, at_an_end, time_shift_step
+from rollover.diagnosis.fit.parameterisation import Candidate, physical, with_slices
+from rollover.diagnosis.inference.local_quadratic import roughness_extents, student_widening
 from rollover.diagnosis.result import Interval
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, possible, units_of
@@ -30,7 +35,7 @@ BOTH = (-1.0, 1.0)
 Sides = Mapping[int, Sequence[float]]  # coordinates, and of each -1.0 for down, 1.0 for up
 
 
-def scattered(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], inverse: Array) -> Array:
+def ensemble_variance(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], inverse: Array) -> Array:
     """Variances (p,) of parameters fitted to one run each, by what neighbours of the run scatter by.
 
     sum_r var_k(A^-1 J_r'd_rk) (1 + 1/k) (t/1.96)^2: what was measured is one run more, the model the mean of k.
@@ -41,12 +46,12 @@ def scattered(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], inver
         if k < 2:
             continue
         free += k - 1
-        each = np.array([inverse @ along(block, e, perturbed_run) for perturbed_run in e.perturbed])
+        each = np.array([inverse @ projected_gradient(block, e, perturbed_run) for perturbed_run in e.perturbed])
         found += (1.0 + 1.0 / k) * np.var(each, axis=0, ddof=1)
-    return np.asarray(found * by_student(free)) if free else found
+    return np.asarray(found * student_widening(free)) if free else found
 
 
-def disagreeing(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], inverse: Array) -> Array:
+def between_recording_variance(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], inverse: Array) -> Array:
     """Variances (p,) by how far apart recordings pull parameters: what all models of the noise leave out shows there.
 
     (t/1.96)^2 R/(R - 1) A^-1 [sum_r (g_r - g)(g_r - g)'] A^-1, g_r recording r's part of A dx of (D8), g their mean.
@@ -54,12 +59,12 @@ def disagreeing(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], inv
     number = len(blocks)
     if number < TUNING.least_recordings:
         return np.zeros(inverse.shape[0])
-    pulls = np.array([pull_of_means(e, block) for e, block in zip(dataset, blocks, strict=True)])
+    pulls = np.array([ensemble_mean_gradient(e, block) for e, block in zip(dataset, blocks, strict=True)])
     moved = (pulls - pulls.mean(axis=0)) @ inverse
-    return np.asarray(by_student(number - 1) * number / (number - 1) * np.sum(moved**2, axis=0))
+    return np.asarray(student_widening(number - 1) * number / (number - 1) * np.sum(moved**2, axis=0))
 
 
-def unshaped(problem: Problem, fitted: Fitted, inverse: Array) -> Array:
+def shape_variance(problem: Problem, fitted: Fitted, inverse: Array) -> Array:
     """Variances (p,) of what shapes of the last effect that are not fitted would move: each evenly over its range."""
     found = np.zeros(len(fitted.x))
     last, at = fitted.candidates[-1], list(fitted.x)
@@ -85,10 +90,10 @@ def with_secondary(problem: Problem, fitted: Fitted) -> tuple[Fitted, Array, lis
     """The fit with the shapes of its effects that were not fitted, the prior of each coordinate, where the fitted are.
 
     Such a shape is where it is usual, spread evenly over its range as far as the recordings do not tell; one that is
-    usually not there is left out, and where a look costs a run all are: see `unshaped`.
+    usually not there is left out, and where a look costs a run all are: see `shape_variance`.
     """
     candidates, x, kept, prior = [], list[float](), list[int](), list[float]()
-    for c, place in each_with_own(fitted.candidates):
+    for c, place in with_slices(fitted.candidates):
         own = fitted.x[place]
         kept += range(len(x), len(x) + len(own))
         usual = {name: getattr(EFFECTS[c.id](), name) for name in c.shapes}
@@ -155,7 +160,7 @@ def _rippled(fitted: Fitted) -> set[int]:
 
     From sample to sample that a threshold passes the misfit rises and falls again, along a valley longer than one wave.
     """
-    bent = (own for c, own in each_with_own(fitted.candidates) if c.is_bent)
+    bent = (own for c, own in with_slices(fitted.candidates) if c.is_bent)
     return {k for own in bent for k in range(own.start, own.stop)}
 
 
@@ -185,7 +190,7 @@ def _along_ridge(
     """
     (start, due), far = rise, begun
     x, shifts = [v for j, v in enumerate(fitted.x) if j != k], [b.shift for b in fitted.blocks]
-    if any(len(c.search) == 1 for c, place in each_with_own(fitted.candidates) if place.start <= k < place.stop):
+    if any(len(c.search) == 1 for c, place in with_slices(fitted.candidates) if place.start <= k < place.stop):
         return far
     inside, beyond = (far, due), far
     for _ in range(TUNING.ridge_steps):
@@ -206,7 +211,7 @@ def _along_ridge(
 
 def held_at(fitted: Fitted, k: int, at: float) -> list[Candidate]:
     """The effects of a fit with its k-th coordinate held at a place."""
-    c, place = next((c, place) for c, place in each_with_own(fitted.candidates) if place.start <= k < place.stop)
+    c, place = next((c, place) for c, place in with_slices(fitted.candidates) if place.start <= k < place.stop)
     name = list(c.search)[k - place.start]
     rest = {n: s for n, s in c.search.items() if n != name}
     held = replace(c, search=rest, fixed={**c.fixed, name: physical(at, c.search[name])})
@@ -240,7 +245,7 @@ def _within_range(problem: Problem, fitted: Fitted, wide: Array, dispersion: flo
 
 
 def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: float) -> Array:
-    """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `over_roughness`.
+    """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `roughness_extents`.
 
     In units of `own` deviations down and up, NaN where runs do not tell. It has in it what scatter and disagreement do.
     """
@@ -260,7 +265,7 @@ def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: 
             ]
             return [None if f is None else f.blocks for f in met]
 
-        told = over_roughness(runs, [b.plain_J @ way for b in fitted.blocks], TWO_SIDED**2 * dispersion)
+        told = roughness_extents(runs, [b.unweighted_J @ way for b in fitted.blocks], TWO_SIDED**2 * dispersion)
         if told is not None:
             found[k] = told
     return found
@@ -271,7 +276,7 @@ def _misfit(problem: Problem, fitted: Fitted, way: Array) -> float | None:
     moved = _clocked(problem, fitted, way)
     if moved is None:
         return None
-    return left_of_means(problem, moved)[0] if any(e.perturbed for e in problem.dataset) else moved.left
+    return ensemble_mean_misfit(problem, moved)[0] if any(e.perturbed for e in problem.dataset) else moved.left
 
 
 def _clocked(problem: Problem, fitted: Fitted, way: Array) -> Fitted | None:
@@ -280,7 +285,11 @@ def _clocked(problem: Problem, fitted: Fitted, way: Array) -> Fitted | None:
     problem.made_ahead((r, fitted.candidates, x) for r in range(len(fitted.blocks)))
     found = [
         problem.clocked(
-            r, fitted.candidates, x, there.shift + shift_of(there, way), SETTINGS.fit.finite_differences.shift_rounds
+            r,
+            fitted.candidates,
+            x,
+            there.shift + time_shift_step(there, way),
+            SETTINGS.fit.finite_differences.shift_rounds,
         )
         for r, there in enumerate(fitted.blocks)
     ]
@@ -308,11 +317,11 @@ def intervals(
     cov = phi A^-1, phi the misfit left per sample (at least 1); beside it, in quadrature, what a gain error of the
     model of `model_error` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
     that nobody could tell apart scatter and samples are weighed by that, cov = phi A^-1 N A^-1 with N the covariance
-    that the noise alone gives J'w; beside it stand `scattered` and `unshaped`. Elsewhere shapes that were not fitted
-    are in A, see `with_secondary`; an end of a range is read off where samples pile up there. How far the misfit stays
-    low is told by `quadratic_extents` where runs scatter, and by `profile_extents` elsewhere and where that does not
-    tell; with `sides` by `profile_extents` alone, and all others are as wide as slopes say. `coarse` is the fit that
-    was moved to this one `in_shorter_steps`: steps of no length would move it by another 1/(PARTS - 1) of that.
+    that the noise alone gives J'w; beside it stand `ensemble_variance` and `shape_variance`. Elsewhere shapes that were
+    not fitted are in A, see `with_secondary`; an end of a range is read off where samples pile up there. How far the
+    misfit stays low is told by `quadratic_extents` where runs scatter, and by `profile_extents` elsewhere and where that
+    does not tell; with `sides` by `profile_extents` alone, and all others are as wide as slopes say. `coarse` is the fit that
+    was moved to this one `refined_by_ensemble_mean`: steps of no length would move it by another 1/(PARTS - 1) of that.
     """
     told, coarse = fitted, coarse or fitted
     fitted, prior, kept = with_secondary(problem, fitted)
@@ -331,19 +340,19 @@ def intervals(
         for r, block in enumerate(fitted.blocks):
             for signal, part in problem.dataset[r].spans():
                 if signal.channel == channel:
-                    y = block.counted(problem.measured[r] - block.plain_residual)[part]
+                    y = block.counted(problem.measured[r] - block.unweighted_residual)[part]
                     pull += block.J[part].T @ (SETTINGS.data.dataset.model_error * y)
         moved += (inverse @ pull) ** 2
     # a fit that ended before it was at rest is off by what the next step would have been
     rest = inverse @ sum((b.normal()[1] for b in fitted.blocks), np.zeros(p))
     if strayed:
-        moved += scattered(problem.dataset, fitted.blocks, inverse) + unshaped(problem, fitted, inverse)
-        rest = step_of_means(problem.dataset, fitted.blocks)
+        moved += ensemble_variance(problem.dataset, fitted.blocks, inverse) + shape_variance(problem, fitted, inverse)
+        rest = ensemble_mean_step(problem.dataset, fitted.blocks)
     moved += rest**2
     moved[kept] += ((np.array(told.x) - np.array(coarse.x)) / (SETTINGS.fit.ensemble_mean.finer_parts - 1)) ** 2
     variance = sd**2 + moved
     if strayed:
-        variance = np.maximum(variance, disagreeing(problem.dataset, fitted.blocks, inverse))
+        variance = np.maximum(variance, between_recording_variance(problem.dataset, fitted.blocks, inverse))
     sd = np.sqrt(variance)[kept]
     own = np.sqrt(dispersion * np.diag(inverse))[kept]
     rough = np.full((own.size, 2), np.nan)
@@ -373,19 +382,21 @@ def intervals(
             )
             at += 1
         if c.id == "sensor-clipping":
-            values = {name: read_off(one, end_of(problem.dataset, c.channel)) for name, one in values.items()}
+            values = {
+                name: with_full_scale(one, full_scale_of(problem.dataset, c.channel)) for name, one in values.items()
+            }
         values |= {n: Interval(value=v, low=v, high=v, unit=units.get(n, "")) for n, v in c.form.items()}
         found.append(values)
     return found
 
 
-def end_of(dataset: Sequence[Dataset], channel: str | None) -> float | None:
+def full_scale_of(dataset: Sequence[Dataset], channel: str | None) -> float | None:
     """Size of the largest value of a channel if it is met again and again, to the last digit: the end of a range."""
     ends = [s.end for e in dataset for s in e.signals if s.channel == channel]
     return max(ends, default=0.0) or None
 
 
-def read_off(fitted: Interval, end: float | None) -> Interval:
+def with_full_scale(fitted: Interval, end: float | None) -> Interval:
     """The limit that the recordings themselves show, beside one fitted to it: noise that is cut off bends the fit."""
     if end is None or abs(end - fitted.value) > TUNING.near_end * end:
         return fitted

@@ -27,8 +27,13 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.noise.autoregression import Rest, line_spectra, rests
-from rollover.diagnosis.noise.ensemble import is_other, shares, too_many, unseen
-from rollover.diagnosis.noise.outliers import too_often
+from rollover.diagnosis.noise.ensemble import (
+    leave_one_out_neighbours,
+    p_value_of_other_courses,
+    shares,
+    took_other_course,
+)
+from rollover.diagnosis.noise.outliers import outlier_p_value
 from rollover.diagnosis.noise.spectral_lines import basis as line
 from rollover.diagnosis.settings import SETTINGS
 
@@ -96,9 +101,9 @@ def mismatch_of(
 ) -> Mismatch:
     """Judge the residuals at a fitted point; `phases` are (start, name) for each recording."""
     cells: list[Cell] = []
-    perturbed = [unseen(e) for e in dataset]
+    perturbed = [leave_one_out_neighbours(e) for e in dataset]
     worth = [_worth(e, block, apart) for e, block, apart in zip(dataset, blocks, perturbed, strict=True)]
-    humming, colours = line_spectra(dataset, [b.valued for b in blocks]), rests(dataset)
+    humming, colours = line_spectra(dataset, [b.residual_for_squares for b in blocks]), rests(dataset)
     for r, (e, block) in enumerate(zip(dataset, blocks, strict=True)):
         for signal, part in e.spans():
             time = e.recording.time[signal.rows]
@@ -112,16 +117,16 @@ def mismatch_of(
                         due = Expected(signal.weight[inside], rest, perturbed[r][:, rows], worth[r][:, rows])
                     cells.append(_cell(r, signal.channel, name, time[inside], rows, block, line_spectrum, due))
     # after an impact a recording that took another course tells nothing by itself
-    other = [is_other(b.heavy_tail) for b in blocks]
+    other = [took_other_course(b.heavy_tail) for b in blocks]
     telling = [c for c in cells if not (other[c.recording] and c.start >= dataset[c.recording].first_impact)]
     # within half a step of its digits a channel tells nothing, however alike neighbouring samples err
     stepped = {(r, s.channel) for r, e in enumerate(dataset) for s in e.signals if s.step > 0.0}
     telling = [c for c in telling if c.excess > 0.0 or (c.recording, c.channel) not in stepped]
     by_channel: dict[str, list[Array]] = {}
     for c in telling:
-        by_channel.setdefault(c.channel, []).append(blocks[c.recording].valued[c.rows])
-    p = min(_p_value(telling, len(blocks)), too_often(np.concatenate(w) for w in by_channel.values()))
-    sent = too_many(sum(other), len(other))
+        by_channel.setdefault(c.channel, []).append(blocks[c.recording].residual_for_squares[c.rows])
+    p = min(_p_value(telling, len(blocks)), outlier_p_value(np.concatenate(w) for w in by_channel.values()))
+    sent = p_value_of_other_courses(sum(other), len(other))
     p = (
         min(p, sent) if sent <= SETTINGS.noise.ensemble.other_course_p_value else p
     )  # one may, not all of them: whole numbers, and no p-value until they tell
@@ -198,7 +203,7 @@ def _cell(
 ) -> Cell:
     from scipy.special import fdtrc
 
-    w, s = block.valued[rows], block.slope[rows]
+    w, s = block.residual_for_squares[rows], block.slope[rows]
     n = rows.size
     waves = int(min(TUNING.most_waves, max(1, n // 6)))
     phase_of = (np.arange(n) + 0.5) / n

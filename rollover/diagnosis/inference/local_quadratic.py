@@ -40,14 +40,14 @@ Runs = Callable[
 ]  # at places t; None where nothing can be simulated
 
 
-def by_student(free: float) -> float:
+def student_widening(free: float) -> float:
     """(t/1.96)^2: how much wider squares are, estimated with so few degrees of freedom."""
     from scipy.special import stdtrit
 
     return (float(stdtrit(free, 0.975)) / TUNING.normal_quantile) ** 2
 
 
-def over_roughness(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[float, float] | None:
+def roughness_extents(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[float, float] | None:
     """How far (t, down and up) the mean course of runs may be what was measured, by (R1) to (R3).
 
     `slopes` (n,) are those at the fit, of each recording by t, of samples that count in full. Nought both where they
@@ -98,8 +98,8 @@ def _alike(blocks: Sequence[ResidualBlock], nearest: Sequence[int], slope: Array
     Samples count at all places what they do in the middle of the nearest runs; the shift's part of (D1) is the last.
     """
     counts = np.median([blocks[k].counted(np.ones(slope.size)) for k in nearest], axis=0)
-    late = np.append(counts * np.mean([blocks[k].plain_slope for k in nearest], axis=0), 1.0 / blocks[0].prior)
-    left = np.array([np.append(counts * b.plain_residual, -b.shift / b.prior) for b in blocks])
+    late = np.append(counts * np.mean([blocks[k].unweighted_slope for k in nearest], axis=0), 1.0 / blocks[0].prior)
+    left = np.array([np.append(counts * b.unweighted_residual, -b.shift / b.prior) for b in blocks])
     across = np.append(counts * slope, 0.0)
     size = float(late @ late)
     return left - np.outer(left @ late / size, late), across - late * float(late @ across) / size
@@ -130,7 +130,7 @@ def _slope(t: Array, recordings: Sequence[tuple[Array, Array]], due: float) -> S
     middle, flat, whole = -b / c, float(np.sqrt(due / c)), sum(pulled)
     variance = (1.0 + h[0, 0] + 2.0 * middle * h[0, 1] + middle**2 * h[1, 1]) * whole / c**2
     if whole > 0.0:
-        variance *= by_student((t.size - 3) * whole**2 / sum(p**2 for p in pulled))
+        variance *= student_widening((t.size - 3) * whole**2 / sum(p**2 for p in pulled))
     half = float(np.hypot(flat, TUNING.normal_quantile * np.sqrt(variance)))
     share = along / steep if steep > 0.0 else 0.0
     clear = c / chance if chance > 0.0 else np.inf

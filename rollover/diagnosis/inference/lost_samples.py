@@ -40,7 +40,7 @@ def _breaks(recording: Recording, channel: str) -> Iterator[tuple[float, float]]
     yield from ((float(told.time[k - 1]), float(told.time[k])) for k in leaping(told, recording.cfc.get(channel)))
 
 
-def by_loss(places: Sequence[Place]) -> str:
+def loss_sentence(places: Sequence[Place]) -> str:
     """The sentence on what recordings lost."""
     channels = dict.fromkeys(p.channel for p in places)
     said = " and ".join(f"{c} breaks off in {sum(p.channel == c for p in places)} places" for c in channels)

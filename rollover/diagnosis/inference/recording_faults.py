@@ -9,9 +9,9 @@ from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import Aside
 from rollover.diagnosis.data.phases import phases_of, whole
 from rollover.diagnosis.fit.step import Phases
-from rollover.diagnosis.inference.clipping import cut_off
-from rollover.diagnosis.inference.coarse_sampling import by_digits, coarse
-from rollover.diagnosis.inference.lost_samples import by_loss, lost
+from rollover.diagnosis.inference.clipping import clipped_channels
+from rollover.diagnosis.inference.coarse_sampling import coarse, digit_sentence
+from rollover.diagnosis.inference.lost_samples import loss_sentence, lost
 from rollover.diagnosis.result import Named, Place, Verdict
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
@@ -27,34 +27,34 @@ class RecordingFault:
     sentence: str
     p_value: float
 
-    def is_of(self, channels: Iterable[str | None]) -> bool:
+    def is_covered_by(self, channels: Iterable[str | None]) -> bool:
         """Whether all of some channels are among those that it shows."""
         return {p.channel for p in self.places}.issuperset(channels)
 
 
-def by_themselves(
+def intrinsic_faults(
     dataset: Sequence[Dataset], recordings: Mapping[str, Recording], phases: Phases, p_value: float
 ) -> RecordingFault | None:
     """What recordings show by themselves, that differ from their simulation with `p_value`; None if they are sound."""
     names = [e.name for e in dataset]
     if places := coarse(dataset, phases):  # in coarse steps any top is flat
-        return _unexplained(places, by_digits(places, dataset), len(dataset), p_value)
+        return _unexplained(places, digit_sentence(places, dataset), len(dataset), p_value)
     whole = [recordings[name] for name in names]
-    effects, places = cut_off(names, whole, phases)
+    effects, places = clipped_channels(names, whole, phases)
     if effects:
-        said = agreeing_but(effects, len(dataset), p_value)
+        said = agreement_but_for(effects, len(dataset), p_value)
         least = min(p_value, *(e.p_value for e in effects))
         return RecordingFault(verdict="sensor", effects=effects, places=places, sentence=said, p_value=least)
-    return broken_off(dataset, recordings, phases, p_value)
+    return truncation_fault(dataset, recordings, phases, p_value)
 
 
-def broken_off(
+def truncation_fault(
     dataset: Sequence[Dataset], recordings: Mapping[str, Recording], phases: Phases, p_value: float
 ) -> RecordingFault | None:
     """Where recordings break off again and again; None if they do not."""
     names = [e.name for e in dataset]
     places = lost(names, [recordings[name] for name in names], phases)
-    return _unexplained(places, by_loss(places), len(dataset), p_value) if places else None
+    return _unexplained(places, loss_sentence(places), len(dataset), p_value) if places else None
 
 
 def misread(inconsistencies: Sequence[Aside], recordings: int, p_value: float) -> RecordingFault | None:
@@ -68,7 +68,7 @@ def misread(inconsistencies: Sequence[Aside], recordings: int, p_value: float) -
     return _unexplained(places, said, recordings, p_value) if inconsistencies else None
 
 
-def agreeing_but(effects: Sequence[Named], recordings: int, p_value: float) -> str:
+def agreement_but_for(effects: Sequence[Named], recordings: int, p_value: float) -> str:
     """The sentence on recordings that agree with the simulation but for what they show by themselves."""
     return _otherwise(" ".join(e.statement for e in effects), recordings, _within(p_value))
 

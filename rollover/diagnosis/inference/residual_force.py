@@ -21,7 +21,7 @@ from ground.compiled import leaf
 from ground.law import REFERENCE_AREA, along
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
-from rollover.diagnosis.forward.filtering import behind_filters, rows_of
+from rollover.diagnosis.forward.filtering import filtered_like, rows_of
 from rollover.diagnosis.inference.bases import linear_b_splines
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import DropModel
@@ -67,13 +67,13 @@ class Way:
         sign = -1.0 if where == "ground" else 1.0
         z, v, a = (np.zeros(f.shape) for _ in range(3))
         v[0] = faster
-        pushed(np.ascontiguousarray(sign * f / self.whole), self.stiffness / self.whole, TUNING.step, z, v, a)
+        newmark_response(np.ascontiguousarray(sign * f / self.whole), self.stiffness / self.whole, TUNING.step, z, v, a)
         felt = -self.mass * a if where == "ground" else f - self.mass * a
         return z, v, a, felt
 
 
 @leaf
-def pushed(push: Any, k: Any, h: float, z: Any, v: Any, a: Any) -> None:
+def newmark_response(push: Any, k: Any, h: float, z: Any, v: Any, a: Any) -> None:
     """z'' = push - k z for each column of accelerations (n, m), by Newmark's rule; z and v begin as they are given."""
     for j in range(push.shape[1]):
         a[0, j] = push[0, j]
@@ -105,7 +105,7 @@ def channels_of(way: Way, moves: Moves, e: Dataset, shift: float) -> Array:
     for channel in e.recording.channels:
         y = shown.get(channel)
         found[channel] = nothing if y is None else begun * ((1.0 - ahead) * y[at] + ahead * y[at + 1])
-    return np.asarray(e.marginalised(e.whitened(e.raw(behind_filters(found, e.recording, rows)))))
+    return np.asarray(e.marginalised(e.whitened(e.raw(filtered_like(found, e.recording, rows)))))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -117,7 +117,7 @@ def best_subsets(found: Sequence[Balance], depth: float, speed: float) -> list[S
         G.append(S.T @ S)
         h.append(S.T @ r)
         power.append(float(r @ r))
-    by_size = [_of_size(size, np.array(G), np.array(h), np.array(power)) for size in range(1, MOST + 1)]
+    by_size = [_best_of_size(size, np.array(G), np.array(h), np.array(power)) for size in range(1, MOST + 1)]
     chosen = by_size[0]
     for larger in by_size[1:]:
         gains = 0.5 * np.log(np.maximum(chosen[0].left, 1e-300) / np.maximum(larger[0].left, 1e-300))
@@ -126,7 +126,7 @@ def best_subsets(found: Sequence[Balance], depth: float, speed: float) -> list[S
     return chosen
 
 
-def _of_size(size: int, G: Array, h: Array, power: Array) -> list[Subset]:
+def _best_of_size(size: int, G: Array, h: Array, power: Array) -> list[Subset]:
     """The best sets of one size by leaving out one condition after another; G (c, m, m), h (c, m), power (c,)."""
     sets = np.array(list(combinations(range(G.shape[1]), size)))
     rows, columns = sets[:, :, None], sets[:, None, :]

@@ -10,7 +10,7 @@ import numpy as np
 from rollover.comparison.rating import Iso18571, iso18571
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Held, held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, shift_of
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, time_shift_step
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.result import Score
 from rollover.diagnosis.settings import SETTINGS
@@ -51,7 +51,7 @@ def judged(problem: Problem, fitted: Fitted, kept: Sequence[Dataset], groups: Se
     return Judged(scores={"training": train, "held_out": score}, held=held, by_recording=tuple(rows))
 
 
-def before_an_impact(dataset: Sequence[Dataset], fitted: Fitted) -> float | None:
+def misfit_before_impact(dataset: Sequence[Dataset], fitted: Fitted) -> float | None:
     """Misfit over the noise of all samples before the first impact, where no run scatters; None where none does after.
 
     None of few too; those at a start, which have no past to be whitened with, are none. Samples beyond an impact count
@@ -59,7 +59,7 @@ def before_an_impact(dataset: Sequence[Dataset], fitted: Fitted) -> float | None
     """
     if all(e.expected is None for e in dataset):
         return None
-    early = np.concatenate([b.plain_residual[e.early] for e, b in zip(dataset, fitted.blocks, strict=True)])
+    early = np.concatenate([b.unweighted_residual[e.early] for e, b in zip(dataset, fitted.blocks, strict=True)])
     telling = early[early != 0.0]
     return float(np.sqrt(np.mean(telling**2))) if telling.size >= TUNING.least_samples else None
 
@@ -75,7 +75,7 @@ def predicted(problem: Problem, fitted: Fitted, rounds: int = 5) -> Fitted | Non
                 return None
             if best is None or block.total < best.total:
                 best = block
-            at = best.shift + (0.5 if best is not block else 1.0) * shift_of(best, np.zeros(len(fitted.x)))
+            at = best.shift + (0.5 if best is not block else 1.0) * time_shift_step(best, np.zeros(len(fitted.x)))
         assert best is not None
         blocks.append(best)
     return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(blocks))

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.data.inconsistent import Aside, factor_of
+from rollover.diagnosis.data.inconsistent import Aside, relative_scale
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import spoken
 
@@ -54,28 +54,28 @@ def wrong_conditions(every: Sequence[Dataset]) -> list[WrongCondition]:
     if len(told) < TUNING.least_recordings:
         return []
     x, y = np.log([_speed(e) for e, *_ in told]), np.log([a for *_, a in told])
-    off = [_off(r, x, y) for r in range(x.size)]
+    off = [_deviation(r, x, y) for r in range(x.size)]
     r = int(np.argmax([abs(d) / error for d, error in off]))
     d, error = off[r]
     if abs(d) < max(TUNING.least_deviation, TUNING.least_errors * error):
         return []
     e, signal, _ = told[r]
-    best = [_dropped(other) for other, *_ in told]
-    more, _ = _off(r, x, np.array([log_ for log_, _ in best]))
+    best = [_best_speed(other) for other, *_ in told]
+    more, _ = _deviation(r, x, np.array([log_ for log_, _ in best]))
     _, left = best[r]
-    stated = _missed(e, _speed(e))
+    stated = _misfit_power(e, _speed(e))
     alike = left < TUNING.most_power * max(power for k, (_, power) in enumerate(best) if k != r)
     if more * d < 0.0 or abs(more) < TUNING.least_speed_change or not alike or left > stated / TUNING.least_fall:
         return []
     return [WrongCondition(dataset=e, signal=signal, speed=_speed(e) * math.exp(more))]
 
 
-def _dropped(e: Dataset) -> tuple[float, float]:
+def _best_speed(e: Dataset) -> tuple[float, float]:
     """Logarithm of the speed, over the stated one, at which a recording is met best, and what is left there."""
     from scipy.optimize import minimize_scalar
 
     def left(log_: float) -> float:
-        return _missed(e, _speed(e) * math.exp(log_))
+        return _misfit_power(e, _speed(e) * math.exp(log_))
 
     about = min(np.linspace(-TUNING.most_speed_change, TUNING.most_speed_change, 9), key=left)
     beside = about + TUNING.most_speed_change / 4.0 * np.array([-1.0, 1.0])
@@ -83,7 +83,7 @@ def _dropped(e: Dataset) -> tuple[float, float]:
     return float(found.x), float(found.fun)
 
 
-def _missed(e: Dataset, speed: float) -> float:
+def _misfit_power(e: Dataset, speed: float) -> float:
     """Power over the noise that a recording misses the simulation at a speed (m/s) by, at its best time shift."""
     from scipy.optimize import minimize_scalar
 
@@ -98,7 +98,7 @@ def _missed(e: Dataset, speed: float) -> float:
     return float(minimize_scalar(left, bounds=(-wide, wide), method="bounded", options={"maxiter": 12}).fun)
 
 
-def _off(r: int, x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+def _deviation(r: int, x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     """d of (M1) of recording r, and its standard error by how far the others lie off their line."""
     rest = np.arange(x.size) != r
     if np.ptp(x[rest]) == 0.0:
@@ -114,7 +114,7 @@ def _off(r: int, x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
 def _factor(e: Dataset, s: Signal) -> float:
     """How many times what is simulated a signal reads; 0 where the two are not alike."""
     made = (e.simulator.predict({}, 0.0) or {}).get(s.channel)
-    return 0.0 if made is None else factor_of(e, s, made) or 0.0
+    return 0.0 if made is None else relative_scale(e, s, made) or 0.0
 
 
 def _speed(e: Dataset) -> float:

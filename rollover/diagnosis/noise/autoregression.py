@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Dataset, Signal, by_differences
+from rollover.diagnosis.data.dataset import Dataset, Signal, noise_from_differences
 from rollover.diagnosis.forward.forward_model import first_impact_of
-from rollover.diagnosis.noise.drift import is_recorders
+from rollover.diagnosis.noise.drift import is_recorder_noise
 from rollover.diagnosis.noise.outliers import without_outliers
 from rollover.diagnosis.noise.spectral_lines import lines, without
 from rollover.diagnosis.settings import SETTINGS
@@ -31,18 +31,18 @@ TUNING = SETTINGS.noise.autoregression
 ENOUGH = 2 * TUNING.least_windows * LENGTH  # samples that have as many
 
 
-def quiet(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Dataset]:
+def with_noise_of_quiet_stretches(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Dataset]:
     """The evidence with its noise from the quiet stretches of the misfits (SI, stacked), recordings alike together."""
     found = [list(e.signals) for e in dataset]
     humming = line_spectra(dataset, residuals)
-    for members in alike(dataset):
+    for members in signals_of_one_recorder(dataset):
         misfits, values = [], []
         for r, _, s, part in members:
             told = _before_the_impact(dataset[r], s)
             without_lines = _cleaned(dataset[r], s, residuals[r][part], humming)
             misfits.append((without_lines / s.heteroscedasticity)[told])
             values.append(((s.values - residuals[r][part] + without_lines) / s.heteroscedasticity)[told])
-        sizes = unlike(misfits, values)
+        sizes = loudness_ratio(misfits, values)
         misfits, values = ([v / size for v, size in zip(each, sizes, strict=True)] for each in (misfits, values))
         common = _quieter(misfits, values)
         if common is None:
@@ -55,13 +55,13 @@ def quiet(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Datase
             best = own if own is not None and loud else common
             found[r][k] = replace(s, noise=best.sigma * size, ar=best.ar)
     found = [
-        [replace(with_noise(s, s.noise, s.ar, e.error_of(s)), at_rest=(s.noise, s.ar)) for s in f]
+        [replace(with_noise(s, s.noise, s.ar, e.model_error_of(s)), at_rest=(s.noise, s.ar)) for s in f]
         for e, f in zip(dataset, found, strict=True)
     ]
     return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
 
 
-def unlike(misfits: Sequence[Array], values: Sequence[Array]) -> Array:
+def loudness_ratio(misfits: Sequence[Array], values: Sequence[Array]) -> Array:
     """How many times as loud each of several short recordings is as they are on the whole, (n,); 1 if chance makes it.
 
     An amplifier may have been set for each test. What has many windows tells its own noise by these; by second
@@ -72,7 +72,7 @@ def unlike(misfits: Sequence[Array], values: Sequence[Array]) -> Array:
     even = np.ones(len(misfits))
     if max((v.size for v in misfits), default=0) < LENGTH or all(v.size >= ENOUGH for v in misfits):
         return even
-    levels = np.array([min(map(by_differences, both)) for both in zip(misfits, values, strict=True)])
+    levels = np.array([min(map(noise_from_differences, both)) for both in zip(misfits, values, strict=True)])
     if len(misfits) == 1 or levels.min() <= 0.0:
         return even
     worth = np.array([v.size for v in misfits]) / TUNING.level_error**2
@@ -86,12 +86,12 @@ def _before_the_impact(e: Dataset, s: Signal) -> slice:
     return slice(n if n >= LENGTH else None)
 
 
-def whole(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Dataset]:
+def with_noise_of_residuals(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Dataset]:
     """The evidence with its noise from all of the misfits: an autoregression by least squares, recordings together."""
     found = [list(e.signals) for e in dataset]
     humming = line_spectra(dataset, residuals)
     shared: list[tuple[list[Member], list[Array]]] = []
-    for members in alike(dataset):
+    for members in signals_of_one_recorder(dataset):
         members = [m for m in members if not dataset[m[0]].model_error_dominates(m[2])]
         parts = [
             _cleaned(dataset[r], s, residuals[r][part], humming) / s.heteroscedasticity for r, _, s, part in members
@@ -99,24 +99,24 @@ def whole(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Datase
         # what comes now and then is no noise
         if members and not any(is_bursting(m[2], part, _level(part)) for m, part in zip(members, parts, strict=True)):
             shared.append((members, parts))
-    told = [one for both in shared for one in _told(*both, autoregression)]
-    slow = slower(told)
+    told = [one for both in shared for one in _pooled_noise(*both, autoregression)]
+    slow = channels_with_slow_residuals(told)
     misfits: dict[str, list[tuple[Dataset, Signal, Array]]] = {}
     for members, parts in shared:
         each = ((dataset[r], s, p) for (r, _, s, _), p in zip(members, parts, strict=True))
         misfits.setdefault(members[0][2].channel, []).extend(each)
-    far = {channel for channel, every in misfits.items() if is_recorders(every)}
+    far = {channel for channel, every in misfits.items() if is_recorder_noise(every)}
     if slow <= far:
         told = [one for one in told if one[2].channel not in far]
-        told += [one for both in shared if both[0][0][2].channel in far for one in _told(*both, long_memory)]
+        told += [one for both in shared if both[0][0][2].channel in far for one in _pooled_noise(*both, long_memory)]
         slow = set()
     for r, k, s, sigma, ar in told:
         if s.channel not in slow:
-            found[r][k] = with_noise(s, sigma, ar, dataset[r].error_of(s))
+            found[r][k] = with_noise(s, sigma, ar, dataset[r].model_error_of(s))
     return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
 
 
-def _told(members: Sequence[Member], parts: Sequence[Array], memory: Memory) -> list[Told]:
+def _pooled_noise(members: Sequence[Member], parts: Sequence[Array], memory: Memory) -> list[Told]:
     """Noise of recordings alike by what each leaves: one colour of all, and one level unless they clearly differ."""
     levels = np.array([_level(p) for p in parts])
     _, ar = memory([p / level for p, level in zip(parts, levels, strict=True)])
@@ -151,13 +151,13 @@ def _cleaned(e: Dataset, s: Signal, misfit: Array, humming: Mapping[str, tuple[f
     return without(e.recording.time[s.rows], misfit, humming[s.channel])
 
 
-def slower(told: Sequence[Told]) -> set[str]:
+def channels_with_slow_residuals(told: Sequence[Told]) -> set[str]:
     """Channels whose misfits are so much slower than their quiet stretches that they are no noise."""
     by: dict[str, list[tuple[float, float, int]]] = {}
     for _, _, s, sigma, ar in told:
         noise, own = s.quiet
         if noise > 0.0 and sigma > 0.0:
-            more = np.log(level_of(sigma, ar) / level_of(noise, own))
+            more = np.log(low_frequency_level(sigma, ar) / low_frequency_level(noise, own))
             # what is only louder was not quiet there: all of it, what is rough too
             more -= max(np.log(sigma / grown(ar) / (noise / grown(own))), 0.0)
             by.setdefault(s.channel, []).append(
@@ -166,13 +166,13 @@ def slower(told: Sequence[Told]) -> set[str]:
     slow = set()
     for channel, each in by.items():
         weights = [float(n) for *_, n in each]
-        allowed = [tolerated(memory, sum(weights)) for _, memory, _ in each]
+        allowed = [slow_noise_margin(memory, sum(weights)) for _, memory, _ in each]
         if np.average([m for m, *_ in each], weights=weights) > np.average(allowed, weights=weights):
             slow.add(channel)
     return slow
 
 
-def tolerated(memory: float, count: float) -> float:
+def slow_noise_margin(memory: float, count: float) -> float:
     """Logarithm by which slow noise may exceed what quiet stretches say of it: sigma sqrt((1 + a)/(1 - a)).
 
     A memory a, told by `count` samples with a standard error of sqrt((1 - a^2)/count), moves that by its (1 - a)th.
@@ -191,12 +191,12 @@ def is_bursting(s: Signal, misfit: Array, level: float) -> bool:
     )
 
 
-def level_of(sigma: float, ar: tuple[float, ...]) -> float:
+def low_frequency_level(sigma: float, ar: tuple[float, ...]) -> float:
     """Level of what is slow in a noise: sqrt of its spectral density at no frequency, per sample."""
     return sigma / grown(ar) / max(1.0 - sum(ar), 1.0 - TUNING.largest_root)
 
 
-def alike(dataset: Sequence[Dataset]) -> list[list[Member]]:
+def signals_of_one_recorder(dataset: Sequence[Dataset]) -> list[list[Member]]:
     """Signals (recording, place, signal, its part of the stack) of one channel that share a recorder.
 
     The same rate, as many samples averaged, the same filter class.
@@ -244,7 +244,7 @@ def rests(dataset: Sequence[Dataset]) -> list[dict[str, Rest]]:
     Only where samples are weighed: elsewhere noise is held against its own roughness, not against what is expected.
     """
     found: list[dict[str, Rest]] = [{s.channel: Rest() for s in e.signals} for e in dataset]
-    for members in alike(dataset):
+    for members in signals_of_one_recorder(dataset):
         told = sum(int(dataset[r].early[part].sum()) for r, _, _, part in members)
         for r, _, s, _ in members:
             e = dataset[r]

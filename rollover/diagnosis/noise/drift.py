@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 TUNING = SETTINGS.noise.drift
 
 
-def is_recorders(told: Sequence[tuple[Dataset, Signal, Array]]) -> bool:
+def is_recorder_noise(told: Sequence[tuple[Dataset, Signal, Array]]) -> bool:
     """Whether slow misfits (n,) of a channel, one of each recording, are its recorder's noise; not if none can tell."""
     ends = [int(np.searchsorted(e.recording.time[s.rows], e.simulator.contact)) for e, s, _ in told]
     if len(told) < TUNING.least_recordings or any(
@@ -37,17 +37,19 @@ def is_recorders(told: Sequence[tuple[Dataset, Signal, Array]]) -> bool:
         return False
     if any(s.quiet[0] <= 0.0 for _, s, _ in told):
         return False  # next to no noise at all everything is slow and loud
-    before = np.array([along(s, w[:n], TUNING.approach_terms) for n, (_, s, w) in zip(ends, told, strict=True)])
+    before = np.array(
+        [leading_cosines(s, w[:n], TUNING.approach_terms) for n, (_, s, w) in zip(ends, told, strict=True)]
+    )
     if not is_slow(before):
         return False
     after = [
-        along(s, part, TUNING.approach_terms)
+        leading_cosines(s, part, TUNING.approach_terms)
         for n, (_, s, w) in zip(ends, told, strict=True)
         for part in _windows(w[n:], n)
     ]
     if is_louder(before, np.array(after)):
         return False
-    whole = [along(s, w[n:], TUNING.contact_terms) for n, (_, s, w) in zip(ends, told, strict=True)]
+    whole = [leading_cosines(s, w[n:], TUNING.contact_terms) for n, (_, s, w) in zip(ends, told, strict=True)]
     plain = [
         cosines(w.size - n, TUNING.contact_terms) @ w[n:] / math.sqrt(w.size - n)
         for n, (*_, w) in zip(ends, told, strict=True)
@@ -62,7 +64,7 @@ def _windows(values: Array, n: int) -> Array:
     return values[: many * n].reshape(many, n)
 
 
-def along(s: Signal, misfit: Array, terms: int) -> Array:
+def leading_cosines(s: Signal, misfit: Array, terms: int) -> Array:
     """The first cosines of a stretch of a misfit, (terms,), over what the noise of quiet stretches lets expect of each.
 
     Of a memory a a direction d has the variance d' C d, C of a^|i - j|: sum_i d_i (2 y_i - d_i), y_i = d_i + a y_(i-1)

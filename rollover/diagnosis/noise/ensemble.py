@@ -44,10 +44,10 @@ Array = NDArray[np.float64]
 TUNING = SETTINGS.noise.ensemble
 
 
-def weighted(e: Dataset, perturbed: Sequence[Mapping[str, Array]]) -> Dataset:
+def with_sample_weights(e: Dataset, perturbed: Sequence[Mapping[str, Array]]) -> Dataset:
     """The evidence with each sample's weight (D3); `perturbed` are the neighbours' deviations at its stamps."""
     first_impact = first_impact_of(e.simulator)
-    perturbed = alike(e, perturbed, first_impact)
+    perturbed = neighbours_on_same_course(e, perturbed, first_impact)
     if not perturbed:
         return e
     signals = tuple(_weighted(e, s, np.stack([d[s.channel][s.rows] for d in perturbed])) for s in e.signals)
@@ -57,7 +57,9 @@ def weighted(e: Dataset, perturbed: Sequence[Mapping[str, Array]]) -> Dataset:
     )
 
 
-def alike(e: Dataset, perturbed: Sequence[Mapping[str, Array]], first_impact: float) -> list[Mapping[str, Array]]:
+def neighbours_on_same_course(
+    e: Dataset, perturbed: Sequence[Mapping[str, Array]], first_impact: float
+) -> list[Mapping[str, Array]]:
     """Neighbours without those that took a clearly other course after the `first_impact` (s): (D9) is for these."""
     late = [(s, s.rows[e.recording.time[s.rows] >= first_impact]) for s in e.signals]
     power = [sum(float(np.nansum((d[s.channel][rows] / s.sigma) ** 2)) for s, rows in late) for d in perturbed]
@@ -71,13 +73,13 @@ def _weighted(e: Dataset, s: Signal, perturbed: Array) -> Signal:
     if not len(perturbed):
         return s
     time = e.recording.time[s.rows]
-    scatter = averaged(np.mean(perturbed**2, axis=0), time)
+    scatter = running_mean(np.mean(perturbed**2, axis=0), time)
     together = min(memory(perturbed), max(1.0, TUNING.longest_memory / float(np.median(np.diff(time)))))
     weight = s.sigma / np.sqrt(s.sigma**2 + TUNING.few_factor * together * scatter)
     return s if weight.min() > TUNING.full_weight else replace(s, weight=weight)
 
 
-def averaged(squares: Array, time: Array) -> Array:
+def running_mean(squares: Array, time: Array) -> Array:
     """Running mean of (n,) over `window`, centred, fewer values at the ends."""
     half = max(1, round(0.5 * TUNING.window / float(np.median(np.diff(time)))))
     sums = np.concatenate([[0.0], np.cumsum(squares)])
@@ -129,7 +131,7 @@ def heavy_tail(e: Dataset, residual: Array) -> HeavyTail | None:
     return HeavyTail(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * left)
 
 
-def unseen(e: Dataset) -> Array:
+def leave_one_out_neighbours(e: Dataset) -> Array:
     """Neighbours (k, n), whitened, each weighed by what the others scatter: the recording is none of them either."""
     found = []
     for k, perturbed_run in enumerate(e.perturbed):
@@ -187,12 +189,12 @@ def gained(less: Array, slope: float) -> Array:
     return np.asarray(-TUNING.state_size * np.log1p(-within / TUNING.state_size) + (less - within) / slope)
 
 
-def is_other(found: HeavyTail | None) -> bool:
+def took_other_course(found: HeavyTail | None) -> bool:
     """Whether a recording took a clearly other course than its run."""
     return found is not None and found.share < TUNING.other_course
 
 
-def too_many(others: int, of: int) -> float:
+def p_value_of_other_courses(others: int, of: int) -> float:
     """p-value of so many recordings that took another course, where each may in `other_course_rate` of all cases."""
     from scipy.special import bdtrc
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.forward.forward_model import first_impact_of
-from rollover.diagnosis.noise.autoregression import alike
+from rollover.diagnosis.noise.autoregression import signals_of_one_recorder
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording.noise_floor import LENGTH, USUAL
 
@@ -30,18 +30,18 @@ TUNING = SETTINGS.noise.heteroscedasticity
 def with_variance_model(dataset: Sequence[Dataset]) -> list[Dataset]:
     """The evidence with each sample's noise where that clearly grows with the value, (D10)."""
     found = [list(e.signals) for e in dataset]
-    for members in alike(dataset):
-        told = [t for r, _, s, _ in members if (t := _told(dataset[r], s)) is not None and _varies(*t)]
+    for members in signals_of_one_recorder(dataset):
+        told = [t for r, _, s, _ in members if (t := _values_and_noise(dataset[r], s)) is not None and _varies(*t)]
         if not told or not _grows(told):
             continue
-        law, least = _law(told)
+        law, least = _variance_polynomial(told)
         for r, k, s, _ in members:
             level = np.sqrt(np.maximum(np.polyval(law, _smoothed(s.values)), least) / least)
             found[r][k] = replace(s, level=level)
     return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
 
 
-def _told(e: Dataset, s: Signal) -> tuple[Array, Array] | None:
+def _values_and_noise(e: Dataset, s: Signal) -> tuple[Array, Array] | None:
     """Values (n,) of a signal and the size of its noise there; None of too few or unevenly spaced samples."""
     s = s.cut(e.recording.time[s.rows] < first_impact_of(e.simulator))
     stamps = np.diff(e.recording.time[s.rows])
@@ -81,7 +81,7 @@ def _grows(told: Sequence[tuple[Array, Array]]) -> bool:
     )
 
 
-def _law(told: Sequence[tuple[Array, Array]]) -> tuple[Array, float]:
+def _variance_polynomial(told: Sequence[tuple[Array, Array]]) -> tuple[Array, float]:
     """Coefficients of s^2 by the value, highest power first, by least squares over what is seen; its least."""
     value, size, _ = _sizes(told, np.concatenate([values for values, _ in told]))
     scale = float(np.max(np.abs(value)))

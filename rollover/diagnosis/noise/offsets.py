@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.noise.autoregression import level_of
-from rollover.diagnosis.noise.drift import along
+from rollover.diagnosis.noise.autoregression import low_frequency_level
+from rollover.diagnosis.noise.drift import leading_cosines
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import spoken
 from rollover.spec.channels import describe
@@ -49,23 +49,25 @@ def with_zeros(dataset: Sequence[Dataset], residuals: Sequence[Array], shifts: S
                 before is not None
                 and float(np.ptp((s.values - residual[part])[before])) < TUNING.flat_prediction * s.sigma
             ):
-                error = level_of(s.noise, s.ar) / np.sqrt(before.stop)
+                error = low_frequency_level(s.noise, s.ar) / np.sqrt(before.stop)
                 early = residual[part][before]
-                slow = float(np.sum(along(s, early, 1 + TUNING.wave_terms)[1:] ** 2)) if error > 0.0 else np.inf
+                slow = (
+                    float(np.sum(leading_cosines(s, early, 1 + TUNING.wave_terms)[1:] ** 2)) if error > 0.0 else np.inf
+                )
                 zero = Zero(r=r, k=k, off=float(early.mean()), error=float(error), slow=slow)
                 by.setdefault(s.channel, []).append(zero)
     able = [
         zeros for zeros in by.values() if len(zeros) >= TUNING.least_recordings and all(z.error > 0.0 for z in zeros)
     ]
     found = [list(e.signals) for e in dataset]
-    if _differ(able) and _stand(able):
+    if _differ(able) and _are_stationary(able):
         for z, off in ((z, off) for zeros in able for z, off in zip(zeros, _own(zeros), strict=True)):
             s = found[z.r][z.k]
             found[z.r][z.k] = replace(s, values=s.values - off, zero=off, zero_error=z.error)
     return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
 
 
-def by_zeros(dataset: Sequence[Dataset]) -> list[str]:
+def zero_notes(dataset: Sequence[Dataset]) -> list[str]:
     """A line for each channel whose zeros were set and do differ."""
     by: dict[str, list[Signal]] = {}
     for s in (s for e in dataset for s in e.signals if s.zero_error > 0.0):
@@ -79,7 +81,7 @@ def by_zeros(dataset: Sequence[Dataset]) -> list[str]:
     ]
 
 
-def _stand(every: Sequence[Sequence[Zero]]) -> bool:
+def _are_stationary(every: Sequence[Sequence[Zero]]) -> bool:
     """Whether zeros stand still: what wanders before the first contact, as noise of 1/f, has none."""
     from scipy.special import chdtrc
 
@@ -91,7 +93,7 @@ def _differ(every: Sequence[Sequence[Zero]]) -> bool:
     """Whether (Z1) of all channels together is beyond chance: who sets one zero anew sets all."""
     from scipy.special import chdtrc
 
-    squares = sum(float(np.sum((apart / error) ** 2)) for apart, error in map(_off, every))
+    squares = sum(float(np.sum((apart / error) ** 2)) for apart, error in map(_deviation_from_mean, every))
     return bool(every) and float(chdtrc(sum(len(zeros) - 1 for zeros in every), squares)) < TUNING.differ_p_value
 
 
@@ -101,10 +103,10 @@ def _own(zeros: Sequence[Zero]) -> list[float]:
 
     off, n = np.array([z.off for z in zeros]), len(zeros)
     chance = 2.0 * float(t.sf(abs(off.mean()) * np.sqrt(n) / max(float(off.std(ddof=1)), 1e-300), n - 1))
-    return [float(v) for v in (_off(zeros)[0] if chance < TUNING.shared_p_value else off)]
+    return [float(v) for v in (_deviation_from_mean(zeros)[0] if chance < TUNING.shared_p_value else off)]
 
 
-def _off(zeros: Sequence[Zero]) -> tuple[Array, Array]:
+def _deviation_from_mean(zeros: Sequence[Zero]) -> tuple[Array, Array]:
     """How far each lies off the mean of all, and its standard error, SI."""
     off, error = np.array([z.off for z in zeros]), np.array([z.error for z in zeros])
     return off - np.average(off, weights=error**-2.0), error

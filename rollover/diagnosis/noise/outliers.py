@@ -30,7 +30,7 @@ def without_outliers(values: Array) -> Array:
     return np.where(far, middle, values) if usual > 0.0 and far.mean() < 1.0 - TUNING.least_clean_share else values
 
 
-def too_often(channels: Iterable[Array]) -> float:
+def outlier_p_value(channels: Iterable[Array]) -> float:
     """p-value of as many samples far off, of noise units (n,) of each channel, were one in a hundred so by chance."""
     from scipy.special import bdtrc
 

@@ -33,7 +33,7 @@ def shortened(e: Dataset, *, alone: bool = False) -> Dataset:
     return up_to(e, end) or e
 
 
-def soon(e: Dataset) -> Dataset:
+def shortly_after_impact(e: Dataset) -> Dataset:
     """The evidence up to `kept_after_impact` after the simulation's impact and the recording's; itself if no longer.
 
     What happens later hangs on what happened until then. The recording's is when half of its channels have gone half of
@@ -67,7 +67,7 @@ def _differs(e: Dataset, late: NDArray[np.bool_]) -> bool:
     return float(missed @ missed) > TUNING.least_misfit * e.by_chance(late)
 
 
-def left_aside(every: Sequence[Dataset], found: Sequence[Dataset]) -> list[str]:
+def truncation_notes(every: Sequence[Dataset], found: Sequence[Dataset]) -> list[str]:
     """The ends of recordings that do not count, in sentences."""
     ends = {e.name: float(e.recording.time[-1]) for e in every}
     cut = [(e.name, float(e.recording.time[-1])) for e in found if float(e.recording.time[-1]) < ends[e.name]]

@@ -21,7 +21,7 @@ from rollover.diagnosis.invariants import checked
 from rollover.diagnosis.own_model.declaration import BASELINE, ForwardModel, declared
 from rollover.diagnosis.own_model.prepare import begun, prepared_for, with_noise
 from rollover.diagnosis.own_model.tables import candidates_of_model, tables
-from rollover.diagnosis.power import nothing_told
+from rollover.diagnosis.power import cannot_tell
 from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis
 from rollover.diagnosis.selection.context import Inquiry
@@ -69,12 +69,12 @@ def _diagnosed(model: ForwardModel, asked: Asked, tolerance: float) -> Diagnosis
     every = with_noise(model, [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every])
     found, kept = ([e for e in every if (e.name in asked.hold_out) == held] for held in (False, True))
     if sum(e.count for e in found) < TUNING.least_samples:
-        return nothing_told(every, names, notes, asked.began)
+        return cannot_tell(every, names, notes, asked.began)
     problem = Problem(found)
     executor.begin(problem)
     base = begun(model, problem)
     if base is None:
-        return nothing_told(every, names, [*notes, "the model could not be fitted"], asked.began)
+        return cannot_tell(every, names, [*notes, "the model could not be fitted"], asked.began)
     groups = left_out(found)
     if len(groups) < 2 and not kept:
         notes.append("one recording only: what stands as held out is predicted by the fit to it")

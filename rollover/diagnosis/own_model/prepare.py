@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal, dataset_of
-from rollover.diagnosis.data.quantisation import digitised, without_spikes
+from rollover.diagnosis.data.quantisation import with_quantisation, without_spikes
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import ended
 from rollover.diagnosis.noise import autoregression
@@ -50,7 +50,7 @@ def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tu
         else:
             found.append(replace(one, condition=""))  # what drives a recording makes it a test of its own
             read.append(cleaned)
-    return digitised(found, read), notes
+    return with_quantisation(found, read), notes
 
 
 def with_noise(model: ForwardModel, every: Sequence[Dataset]) -> list[Dataset]:
@@ -59,7 +59,7 @@ def with_noise(model: ForwardModel, every: Sequence[Dataset]) -> list[Dataset]:
     base = begun(model, problem)
     if base is None:
         return list(every)
-    told = autoregression.quiet(every, problem.residuals(base))
+    told = autoregression.with_noise_of_quiet_stretches(every, problem.residuals(base))
     found = []
     for e, old in zip(told, every, strict=True):
         signals = [
@@ -72,7 +72,7 @@ def with_noise(model: ForwardModel, every: Sequence[Dataset]) -> list[Dataset]:
 
 def _stated(s: Signal, noise: float, e: Dataset) -> Signal:
     """A signal with white noise of a size that the recording states."""
-    return replace(autoregression.with_noise(s, noise, (), e.error_of(s)), at_rest=(noise, ()))
+    return replace(autoregression.with_noise(s, noise, (), e.model_error_of(s)), at_rest=(noise, ()))
 
 
 def begun(model: ForwardModel, problem: Problem) -> Fitted | None:

@@ -38,7 +38,7 @@ def next_test(scenario: Scenario, dataset: Sequence[Dataset], one: Fitted, other
             continue
         chances = []
         for truth, rival in ((one, other), (other, one)):
-            told = Problem([extra]).edged(0, truth.candidates, truth.x, 0.0)
+            told = Problem([extra]).predicted_with_jumps(0, truth.candidates, truth.x, 0.0)
             before = alone[id(rival)]
             after = None if told is None else _refitted([*dataset, showing(extra, told)], rival)
             if before is not None and after is not None:
@@ -63,7 +63,7 @@ def _as_recorded(dataset: Sequence[Dataset]) -> Instruments:
     for e in dataset:
         for s in e.signals:
             noise.setdefault(s.channel, []).append(s.noise * float(np.sqrt(e.averaged)))
-            misses.append(np.sqrt(max(e.error_of(s) ** 2 - SETTINGS.data.dataset.model_error**2, 0.0)))
+            misses.append(np.sqrt(max(e.model_error_of(s) ** 2 - SETTINGS.data.dataset.model_error**2, 0.0)))
     steps = [float(np.median(np.diff(e.recording.time))) / e.averaged for e in dataset]
     middle: Mapping[str, Any] = {channel: float(np.median(each)) for channel, each in noise.items()}
     rate = float(f"{1.0 / float(np.median(steps)):.4g}")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rollover.diagnosis.fit.parameterisation import Candidate, is_limit, zero_of
+from rollover.diagnosis.fit.parameterisation import Candidate, is_limit, null_of
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.planning.chances import detection, needed, of_one
 from rollover.diagnosis.planning.next_test import Advice, Grid, advice, varied
@@ -202,7 +202,7 @@ def _detectable(tests: Tests, c: Candidate, size: float, enough: float) -> tuple
     def shows(x: tuple[float, ...]) -> float:
         return tests.unexplained(c, x)
 
-    name, _ = zero_of(c)
+    name, _ = null_of(c)
     own, unit = usual(c), units_of(EFFECTS[c.id], c.channel)[name]
     at = place_where_it_acts(c, shows)
     least = None if at is None else strength_with(c, at, shows, enough)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Dataset, Signal, condition_of, doubted
+from rollover.diagnosis.data.dataset import Dataset, Signal, condition_name, with_uncertain_conditions
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.settings import SETTINGS
@@ -41,7 +41,7 @@ def planned(scenario: Scenario, conditions: Mapping[str, Any], instruments: Inst
 
     Raises `InputError` for a condition that the scenario does not know.
     """
-    name = condition_of(conditions) or "as it is"
+    name = condition_name(conditions) or "as it is"
     stub = Recording(title=name, time=np.zeros(1), channels={}, conditions=conditions)
     own = set_up(scenario, stub)
     start = -getattr(own.initiation, "lead_time", 0.0)
@@ -74,7 +74,7 @@ def planned(scenario: Scenario, conditions: Mapping[str, Any], instruments: Inst
         condition=name,
         averaged=averaged,
     )
-    return _gained(doubted(e, own), instruments.gain)
+    return _gained(with_uncertain_conditions(e, own), instruments.gain)
 
 
 def _signal(channel: str, recording: Recording, values: Array, tolerance: float) -> Signal:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import without_shift
+from rollover.diagnosis.fit.linearisation import without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.planning.chances import choice
 from rollover.diagnosis.planning.planned import showing
@@ -56,7 +56,7 @@ class Tests:
                 if any(p is None for p in parts)
                 else np.concatenate(
                     [
-                        without_shift(p[:, None], b)[:, 0]
+                        without_shift_direction(p[:, None], b)[:, 0]
                         for p, b in zip(parts, self._base.blocks, strict=True)
                         if p is not None
                     ]
@@ -71,7 +71,7 @@ class Tests:
         """
         key = (c.key, x)
         if key not in self._shown:
-            raws = [self.problem.edged(r, (c,), x, 0.0) for r in range(len(self.dataset))]
+            raws = [self.problem.predicted_with_jumps(r, (c,), x, 0.0) for r in range(len(self.dataset))]
             made = [showing(e, raw) for e, raw in zip(self.dataset, raws, strict=True) if raw is not None]
             problem = Problem(made)
             nothing = problem.fit((), (), rounds=TUNING.rounds) if len(made) == len(raws) else None

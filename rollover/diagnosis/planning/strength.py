@@ -12,8 +12,8 @@ from rollover.diagnosis.fit.parameterisation import (
     coordinates,
     followed,
     is_limit,
+    null_of,
     physical,
-    zero_of,
 )
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, units_of
@@ -38,7 +38,7 @@ def usual(c: Candidate) -> Place | None:
 
 def scaled(c: Candidate, x: Place, factor: float) -> Place | None:
     """`followed`, and the same of what has the scenario's own value for its zero; None where no value is known."""
-    name, zero = zero_of(c)
+    name, zero = null_of(c)
     if zero is None or EFFECTS[c.id].null.get(name) is not None:
         return followed(c, x, factor)
     search, at = c.search[name], list(c.search).index(name)

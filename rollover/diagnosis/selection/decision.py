@@ -9,22 +9,22 @@ import numpy as np
 
 from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import at_an_end, turned
-from rollover.diagnosis.fit.local_search import but_one, left_at, without
-from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own, is_one_sensor
+from rollover.diagnosis.fit.linearisation import at_an_end, first_effect_last
+from rollover.diagnosis.fit.local_search import all_but_one, left_at, without_effect
+from rollover.diagnosis.fit.parameterisation import Candidate, is_one_sensor, with_slices
 from rollover.diagnosis.fit.step import Groups, Phases, Step
 from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated, matters
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.ensemble_validation import significant_by_wald, unforgiven
-from rollover.diagnosis.selection.flexibility import is_a_curve, is_one_line, is_over_flexible, is_pliant
-from rollover.diagnosis.selection.forward_step import moves
-from rollover.diagnosis.selection.pairs import best_subsets, swapped
+from rollover.diagnosis.selection.ensemble_validation import counted_in_full, significant_by_wald
+from rollover.diagnosis.selection.flexibility import is_a_curve, is_flexible_soil, is_over_flexible, is_straight_line
+from rollover.diagnosis.selection.forward_step import largest_change
+from rollover.diagnosis.selection.pairs import best_subsets, with_first_replaced
 from rollover.diagnosis.selection.score_test import ScoreTest
-from rollover.diagnosis.selection.simplification import followed, mirrored
-from rollover.diagnosis.selection.stepwise import as_conditioned, one_by_one
-from rollover.diagnosis.selection.truncated_start import down_first
+from rollover.diagnosis.selection.simplification import followed, with_mirror_rivals
+from rollover.diagnosis.selection.stepwise import forward_selection, with_conditions_refitted
+from rollover.diagnosis.selection.truncated_start import loading_first
 from rollover.diagnosis.settings import SETTINGS
 
 TUNING = SETTINGS.selection.decision
@@ -79,7 +79,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     Where that ends with less than all, the way down is explained first, and effects are tried two by two.
     """
     problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
-    found = down_first(inquiry, one_by_one(inquiry, base))
+    found = loading_first(inquiry, forward_selection(inquiry, base))
     base, taken, left, current = found.base, list(found.steps), found.left, found.fitted
     is_whole = is_enough(problem, current, left)
     is_open = not (problem.effort.is_ensemble or found.paired) and (not is_whole or len(taken) == MOST_EFFECTS)
@@ -89,12 +89,12 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         if both is not None:
             (taken, left), current = both, both[0][-1].fitted
             is_whole = is_enough(problem, current, left)
-    is_open = is_whole and len(taken) > 1 and is_open_to_be_named(problem, current, left)
-    retained = _ended(inquiry, taken) if is_open else _one_each(inquiry, taken)
+    is_open = is_whole and len(taken) > 1 and may_be_named(problem, current, left)
+    retained = _fully_fitted_steps(inquiry, taken) if is_open else _one_each(inquiry, taken)
     parts = [s.again(problem) for s in taken] if retained is None else retained
     if is_open and retained is not None and not problem.effort.is_ensemble:
-        parts = [mirrored(inquiry, s) for s in retained]
-    base = unforgiven(problem, base) if taken and problem.effort.is_ensemble else problem.again(base)
+        parts = [with_mirror_rivals(inquiry, s) for s in retained]
+    base = counted_in_full(problem, base) if taken and problem.effort.is_ensemble else problem.again(base)
     parts = [s.cross_validated(problem, groups, inquiry.executor.parallel_map) for s in parts]
     current = parts[-1].fitted if parts else base
     return Explanation(
@@ -113,8 +113,8 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     )
 
 
-def is_open_to_be_named(problem: Problem, fitted: Fitted, left: Mismatch) -> bool:
-    """Whether several effects may be named: as many as may be leave no more than `decided` asks, or one is needless."""
+def may_be_named(problem: Problem, fitted: Fitted, left: Mismatch) -> bool:
+    """Whether several effects may be named: all together leave no more than `verdict_on` asks, or one is needless."""
     if problem.effort.is_ensemble or len(fitted.effects) < MOST_EFFECTS or left.p_value > FULL_P_VALUE:
         return True
     if not matters(problem, fitted, left) or is_tolerated(problem, fitted):
@@ -122,9 +122,9 @@ def is_open_to_be_named(problem: Problem, fitted: Fitted, left: Mismatch) -> boo
     return len(backward_elimination(problem, problem.again(fitted)).effects) < MOST_EFFECTS
 
 
-def _ended(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
-    """Steps of the effects that are needed, as `_retained`, the last one's fit followed to its end."""
-    retained = _retained(inquiry, taken)
+def _fully_fitted_steps(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
+    """Steps of the effects that are needed, as `_needed_steps`, the last one's fit followed to its end."""
+    retained = _needed_steps(inquiry, taken)
     return None if retained is None else _one_each(inquiry, [*retained[:-1], followed(inquiry, retained[-1])[0]])
 
 
@@ -140,8 +140,8 @@ def _one_each(inquiry: Inquiry, steps: Sequence[Step]) -> list[Step]:
     found: list[Step] = []
     current = known[last.key].fitted
     for c in others:
-        back = None if c.key in known else swapped(inquiry, current)
-        current = turned(current)
+        back = None if c.key in known else with_first_replaced(inquiry, current)
+        current = first_effect_last(current)
         if back is not None and back.fitted.candidates[-1].key == c.key:
             known[c.key] = back
         elif c.key not in known:
@@ -151,7 +151,7 @@ def _one_each(inquiry: Inquiry, steps: Sequence[Step]) -> list[Step]:
     return [*found, known[last.key]]
 
 
-def _retained(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
+def _needed_steps(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
 
     Beside a better one others may not be needed any more. Returned in such an order that the last one's fit is the
@@ -166,12 +166,12 @@ def _retained(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     parts: list[Step] = []
     exchanged = 0
     while len(parts) < len(current.effects):
-        whole = len(parts) == len(current.effects) - 1 and not is_elsewhere(last)
+        whole = len(parts) == len(current.effects) - 1 and not has_base_moved(last)
         whole = whole and current.effects[0].key == last.fitted.candidates[-1].key
         if whole and {c.token for c in current.candidates} == {c.token for c in last.fitted.candidates}:
             parts.append(last)  # found beside just these others
             break
-        found, taken_out = swapped(inquiry, current), current.effects[0].key
+        found, taken_out = with_first_replaced(inquiry, current), current.effects[0].key
         if found is None:
             return _one_each(inquiry, taken)
         current = backward_elimination(problem, found.fitted)
@@ -183,7 +183,7 @@ def _retained(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     return [s.again(problem) for s in parts]
 
 
-def is_elsewhere(last: Step) -> bool:
+def has_base_moved(last: Step) -> bool:
     """Whether the other effects are no more what they were as the last one and its rivals were looked for beside them.
 
     What was bent to do the last one's work as well left little to those that have less to bend.
@@ -200,7 +200,7 @@ def backward_elimination(problem: Problem, fitted: Fitted, base: Fitted | None =
         losses: list[tuple[float, int, Fitted | None]] = [(np.inf, -1, None)]
         surely = significant_by_wald(problem, fitted) if problem.effort.is_ensemble else set()
         for k in {*range(fitted.first, len(fitted.candidates))} - surely:
-            rest = _rest(problem, fitted, k, base)
+            rest = _without_kth(problem, fitted, k, base)
             losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
         loss, _, rest = min(losses, key=lambda one: one[0])
         dispersion = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
@@ -210,7 +210,7 @@ def backward_elimination(problem: Problem, fitted: Fitted, base: Fitted | None =
     return fitted
 
 
-def _rest(problem: Problem, fitted: Fitted, k: int, base: Fitted | None) -> Fitted | None:
+def _without_kth(problem: Problem, fitted: Fitted, k: int, base: Fitted | None) -> Fitted | None:
     """The explanation without its k-th effect, fitted again unless that is the `base` of full runs: these cost much.
 
     Of these it ends without slopes.
@@ -218,10 +218,10 @@ def _rest(problem: Problem, fitted: Fitted, k: int, base: Fitted | None) -> Fitt
     others = [c.token for j, c in enumerate(fitted.candidates) if j != k]
     if problem.effort.is_ensemble and base is not None and [c.token for c in base.candidates] == others:
         return problem.again(base)
-    return without(problem, fitted, k, no_jacobian=problem.effort.is_ensemble)
+    return without_effect(problem, fitted, k, no_jacobian=problem.effort.is_ensemble)
 
 
-def decided(problem: Problem, found: Explanation, groups: Groups, phases: Phases) -> tuple[Explanation, Verdict]:
+def verdict_on(problem: Problem, found: Explanation, groups: Groups, phases: Phases) -> tuple[Explanation, Verdict]:
     """The verdict; what does not explain is not named.
 
     Several effects are named only if together they leave nothing but noise, or what was said to be tolerated; as many
@@ -229,9 +229,9 @@ def decided(problem: Problem, found: Explanation, groups: Groups, phases: Phases
     where it takes nearly all.
     """
     held, is_curved = found.fitted.effects, is_a_curve(problem, found.fitted)
-    if not found.settled or is_over_flexible(held) or (is_curved and is_one_line(held)):
+    if not found.settled or is_over_flexible(held) or (is_curved and is_straight_line(held)):
         return found.refused(), "unexplained"
-    is_bending = len(found.parts) == MOST_EFFECTS or is_one_sensor(held) or is_pliant(held)
+    is_bending = len(found.parts) == MOST_EFFECTS or is_one_sensor(held) or is_flexible_soil(held)
     is_whole = found.after.p_value > (FULL_P_VALUE if is_bending else P_VALUE)
     if is_bending and not problem.effort.is_ensemble:
         # what is bent to a curve nearly everywhere leaves what it cannot be bent to in one place
@@ -259,7 +259,9 @@ def decided(problem: Problem, found: Explanation, groups: Groups, phases: Phases
         if is_nearly_all and inside:
             return replace(found, parts=(one,), fitted=one.fitted, after=after), kind_of(one.fitted.candidates[-1])
     significant = found.before.p_value < P_VALUE and matters(problem, found.base, found.before)
-    significant = significant and not is_tolerated(problem, found.base) and not is_slight(problem, found.first, phases)
+    significant = (
+        significant and not is_tolerated(problem, found.base) and not is_negligible_effect(problem, found.first, phases)
+    )
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
     return found.refused(), verdict
 
@@ -270,7 +272,7 @@ def takes_little(found: Explanation, groups: Groups, share: float = TUNING.littl
     return start**2 - ahead**2 < share * (start**2 - 1.0)
 
 
-def done_by_others(problem: Problem, found: Explanation, ids: Collection[str]) -> set[str]:
+def redundant_effects(problem: Problem, found: Explanation, ids: Collection[str]) -> set[str]:
     """Of effects that may be nothing by their intervals, those whose work the others do, in any shape of theirs.
 
     A shape that was not fitted widens an interval as far as slopes say. Of full runs, where a fit costs much, all are.
@@ -283,8 +285,8 @@ def done_by_others(problem: Problem, found: Explanation, ids: Collection[str]) -
     for k, c in enumerate(fitted.candidates):
         if c.id not in ids:
             continue
-        others = [(o, fitted.x[own]) for j, (o, own) in enumerate(each_with_own(fitted.candidates)) if j != k]
-        fits = [without(problem, fitted, k)]
+        others = [(o, fitted.x[own]) for j, (o, own) in enumerate(with_slices(fitted.candidates)) if j != k]
+        fits = [without_effect(problem, fitted, k)]
         for j, (other, x) in enumerate(others):
             for place in other.with_secondary(x) if other.shapes else ():
                 way = [*others[:j], (other.whole(), place), *others[j + 1 :]]
@@ -294,7 +296,7 @@ def done_by_others(problem: Problem, found: Explanation, ids: Collection[str]) -
     return done
 
 
-def by_the_first(problem: Problem, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:
+def by_first_effect(problem: Problem, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:
     """The explanation by its first effect alone, where that is none of those that may be `nothing`; else refused.
 
     Of one that was all there is, its gain is refuted with it.
@@ -303,7 +305,7 @@ def by_the_first(problem: Problem, found: Explanation, nothing: Collection[str],
     if one is None or one.fitted.candidates[-1].id in nothing:
         return replace(found.refused(), refuted=found.refuted or len(found.parts) == 1)
     one = one.again(problem)
-    one, after = as_conditioned(problem, one, mismatch_of(problem.dataset, one.fitted.blocks, phases), phases)
+    one, after = with_conditions_refitted(problem, one, mismatch_of(problem.dataset, one.fitted.blocks, phases), phases)
     return replace(found, parts=(one,), fitted=one.fitted, after=after)
 
 
@@ -319,10 +321,10 @@ def strongest(problem: Problem, base: Fitted, fitted: Fitted) -> Candidate:
         if len(fitted.effects) == 1:
             return c
         if problem.effort.is_ensemble:
-            others, columns = but_one(fitted, k)
+            others, columns = all_but_one(fitted, k)
             left = left_at(problem, others, [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks])
         else:
-            rest = without(problem, fitted, k, rounds=4)
+            rest = without_effect(problem, fitted, k, rounds=4)
             left = rest.left if rest is not None else None
         left = base.left if left is None else left
         if left > loss:
@@ -330,8 +332,8 @@ def strongest(problem: Problem, base: Fitted, fitted: Fitted) -> Candidate:
     return best
 
 
-def is_slight(problem: Problem, first: Step | None, phases: Phases) -> bool:
+def is_negligible_effect(problem: Problem, first: Step | None, phases: Phases) -> bool:
     """Whether all that separates simulation and recordings is the work of an effect that moves nothing worth a name."""
-    if first is None or moves(problem, first.base, first.fitted) >= SETTINGS.inference.adequacy.negligible:
+    if first is None or largest_change(problem, first.base, first.fitted) >= SETTINGS.inference.adequacy.negligible:
         return False
     return mismatch_of(problem.dataset, first.fitted.blocks, phases).p_value > P_VALUE

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.ensemble_mean import left_of_means, settled
+from rollover.diagnosis.fit.ensemble_mean import ensemble_mean_misfit, refined_under_scatter
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, physical, same_family
 from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.inference.intervals import intervals
-from rollover.diagnosis.noise.ensemble import is_other, too_many
+from rollover.diagnosis.noise.ensemble import p_value_of_other_courses, took_other_course
 from rollover.diagnosis.result import Interval
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value
-from rollover.diagnosis.selection.screening import begun
+from rollover.diagnosis.selection.screening import initial_time_shifts
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
@@ -26,16 +26,16 @@ Array = NDArray[np.float64]
 TUNING = SETTINGS.selection.ensemble_validation
 
 
-def begun_anew(problem: Problem, base: Fitted) -> Fitted:
+def restarted_base(problem: Problem, base: Fitted) -> Fitted:
     """A base from the time shifts that its rivals begin with, if that leaves less: where runs scatter it hangs on them.
 
     Else what a better clock gains would be every rival's.
     """
-    again = problem.fit(base.candidates, base.x, shifts=begun(problem, base))
+    again = problem.fit(base.candidates, base.x, shifts=initial_time_shifts(problem, base))
     return min((f for f in (base, again) if f is not None), key=lambda f: sum(b.total for b in f.blocks))
 
 
-def unbent(problem: Problem, base: Fitted) -> Fitted:
+def with_shifts_near_prior(problem: Problem, base: Fitted) -> Fitted:
     """A base with its time shifts no further from where known clocks say than their error."""
     blocks = []
     for r, b in enumerate(base.blocks):
@@ -46,7 +46,7 @@ def unbent(problem: Problem, base: Fitted) -> Fitted:
     return replace(base, blocks=tuple(blocks))
 
 
-def astray(problem: Problem, fitted: Fitted) -> Fitted:
+def with_full_weights(problem: Problem, fitted: Fitted) -> Fitted:
     """A fit with all samples counted in full if more recordings took another course than chance sends there.
 
     What so many do together is missing from the simulation, and where they went tells what.
@@ -54,7 +54,7 @@ def astray(problem: Problem, fitted: Fitted) -> Fitted:
     problem.heavy_tailed = True
     found = problem.again(fitted)
     if (
-        too_many(sum(is_other(b.heavy_tail) for b in found.blocks), len(found.blocks))
+        p_value_of_other_courses(sum(took_other_course(b.heavy_tail) for b in found.blocks), len(found.blocks))
         > SETTINGS.noise.ensemble.other_course_p_value
     ):
         return found
@@ -62,17 +62,17 @@ def astray(problem: Problem, fitted: Fitted) -> Fitted:
     return problem.again(fitted)
 
 
-def unforgiven(problem: Problem, base: Fitted) -> Fitted:
+def counted_in_full(problem: Problem, base: Fitted) -> Fitted:
     """A base as an explanation is held against it: in full where its recordings took other courses by more than chance.
 
     Those were forgiven for want of an explanation alone; forgiven they leave no more than the best there is.
     """
-    found = astray(problem, base)
+    found = with_full_weights(problem, base)
     problem.heavy_tailed = True
     return found
 
 
-def backed(found: Step, looked: ScoreTest, spoken: float = TUNING.own_p_value) -> Step:
+def without_unsupported_rivals(found: Step, looked: ScoreTest, spoken: float = TUNING.own_p_value) -> Step:
     """A step without rivals that nothing spoke for when looked at, by a p-value: their runs met them by chance.
 
     What speaks for one that acts somewhere speaks for its kin; for a strong one its runs did.
@@ -89,27 +89,27 @@ def ensemble_validated(problem: Problem, found: Step, groups: Groups) -> Step | 
     Rivals whose mean gains much less are none.
     """
     held = problem.dataset
-    start = left_of_means(problem, found.base)
+    start = ensemble_mean_misfit(problem, found.base)
     gains = {
-        id(f): max(a - b for a, b in zip(start, left_of_means(problem, f), strict=True)) for f in found.rivals
+        id(f): max(a - b for a, b in zip(start, ensemble_mean_misfit(problem, f), strict=True)) for f in found.rivals
     }  # what shows before the impact need not outweigh what chance does after it
     best = max(gains.values(), default=0.0)
     near = [f for f in found.rivals if gains[id(f)] > TUNING.rival_share * best]
     for rival in sorted(near, key=lambda f: -gains[id(f)]):
         if gains[id(rival)] < TUNING.least_gain:
             return None
-        one = settled(problem, replace(found, fitted=rival, rivals=tuple(near)))
+        one = refined_under_scatter(problem, replace(found, fitted=rival, rivals=tuple(near)))
         ahead = replace(one, rivals=()).cross_validated(problem, groups)
         gains_on = (is_validated(ahead, groups) and is_shared(ahead, groups)) or is_validated(
-            before_the_impact(problem, one), groups
+            judged_before_impact(problem, one), groups
         )
-        if gains_on and is_there_as_held(problem, one.fitted):
+        if gains_on and is_significant_as_held(problem, one.fitted):
             return one
         problem.with_noise_model(held)
     return None
 
 
-def before_the_impact(problem: Problem, found: Step) -> Step:
+def judged_before_impact(problem: Problem, found: Step) -> Step:
     """A step judged by samples alone that no course a run may take has touched."""
 
     def cut(f: Fitted) -> Fitted:
@@ -122,7 +122,7 @@ def before_the_impact(problem: Problem, found: Step) -> Step:
     return replace(found, base=cut(found.base), fitted=cut(found.fitted), rivals=())
 
 
-def is_there_as_held(problem: Problem, fitted: Fitted) -> bool:
+def is_significant_as_held(problem: Problem, fitted: Fitted) -> bool:
     """`is_there` with other courses forgiven if that is how the effect will be held, though it was found in full.
 
     What one recording on another course asks for is not what the others do.
@@ -130,7 +130,7 @@ def is_there_as_held(problem: Problem, fitted: Fitted) -> bool:
     if problem.heavy_tailed:
         return is_there(problem, fitted)
     with problem.held(heavy_tailed=True):
-        return is_there(problem, astray(problem, fitted))
+        return is_there(problem, with_full_weights(problem, fitted))
 
 
 def is_there(problem: Problem, fitted: Fitted) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import without_shift
+from rollover.diagnosis.fit.linearisation import without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.settings import SETTINGS
 
@@ -22,13 +22,13 @@ def is_a_curve(problem: Problem, fitted: Fitted) -> bool:
     """Whether effects that make a straight line of a channel leave a curve of it, or one that drifts."""
     channels = {str(c.channel) for c in fitted.candidates if c.id in LINES}
     return any(
-        bow(problem, fitted, channel, term) > TUNING.curve_gain
+        curvature_gain(problem, fitted, channel, term) > TUNING.curve_gain
         for channel in sorted(channels)
         for term in (square, drift)
     )
 
 
-def is_one_line(candidates: Sequence[Candidate]) -> bool:
+def is_straight_line(candidates: Sequence[Candidate]) -> bool:
     """Whether all of several effects make a straight line of one channel."""
     return len({c.channel for c in candidates}) == 1 and all(c.id in LINES for c in candidates)
 
@@ -44,7 +44,9 @@ def drift(read: Array, time: Array) -> Array:
     return np.asarray(read * (time - time.mean()))
 
 
-def bow(problem: Problem, fitted: Fitted, channel: str, term: Callable[[Array, Array], Array] = square) -> float:
+def curvature_gain(
+    problem: Problem, fitted: Fitted, channel: str, term: Callable[[Array, Array], Array] = square
+) -> float:
     """Gain of a term in what a channel reads, over its range, beside all effects of a fit and the time shifts.
 
     Of noise alone it is chi-square of one degree of freedom: z = q'e/|q|, q the term, whitened, freed of the fit's
@@ -60,7 +62,7 @@ def bow(problem: Problem, fitted: Fitted, channel: str, term: Callable[[Array, A
             if signal.channel == channel:
                 added[part] = term(raw[part] / signal.span, e.recording.time[signal.rows])
         own = np.column_stack([block.counted(e.whitened(added)), block.residual, block.J])
-        own = without_shift(own, block)
+        own = without_shift_direction(own, block)
         terms.append(own[:, 0])
         misfits.append(own[:, 1])
         held.append(own[:, 2:])
@@ -86,7 +88,7 @@ def _subject(c: Candidate) -> str:
     return "way back" if c.id in BACK else "soil" if c.id.startswith("soil-") else c.id
 
 
-def is_pliant(candidates: Sequence[Candidate]) -> bool:
+def is_flexible_soil(candidates: Sequence[Candidate]) -> bool:
     """Whether several are of the soil, and one of these takes another shape or form than its usual one."""
     soil = [c for c in candidates if c.id.startswith("soil-")]
     return len(soil) > 1 and any(c.is_bent for c in soil)

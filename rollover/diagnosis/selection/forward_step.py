@@ -8,18 +8,31 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.cross_validation import held_out, refitted, worse
+from rollover.diagnosis.fit.cross_validation import cross_validated_by_refits, held_out, held_out_disadvantage
 from rollover.diagnosis.fit.jobs import Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
 from rollover.diagnosis.fit.linearisation import at_an_end
-from rollover.diagnosis.fit.local_search import shifts_told
+from rollover.diagnosis.fit.local_search import completed_shifts
 from rollover.diagnosis.fit.step import Groups, Phases, Screened, Step
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.restarts import begun_otherwise, from_there, one_each, shaped_too, timed_too
+from rollover.diagnosis.selection.restarts import (
+    begun_otherwise,
+    best_of_each,
+    continued_from,
+    with_shapes,
+    with_time_shifts,
+)
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value
-from rollover.diagnosis.selection.screening import begun, is_far, of_same_family, promising, screen, spread
+from rollover.diagnosis.selection.screening import (
+    initial_time_shifts,
+    is_far,
+    of_same_family,
+    promising,
+    representative_few,
+    screen,
+)
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
 
@@ -37,22 +50,25 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
     inquiry.say(f"looking at {len(candidates)} candidates beside {base.label}")
     # of recordings that went another way together, two may be those that no explanation brings back
     several = problem.effort.few if problem.heavy_tailed else problem.effort.looked_at
-    few, shifts = spread(base, groups, several), begun(problem, base, inquiry.executor.parallel_map)
+    few, shifts = (
+        representative_few(base, groups, several),
+        initial_time_shifts(problem, base, inquiry.executor.parallel_map),
+    )
     who, start = problem.beginning(base)
     early = replace(inquiry, problem=who)
     screened = screen(early, start, promising(candidates, looked, problem.effort), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
     screened, begun_with = _first_fits(early, start, screened, few, shifts, looked)
-    reused = reused_of(problem, base)
+    reused = reusable_slopes(problem, base)
     tasks = [
-        Task(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1, reused=reused)
+        Task(candidates=f.candidates, start=f.x, shifts=completed_shifts(shifts, f, few), width=1, reused=reused)
         for f in begun_with
     ]
     fits = [f for f in inquiry.fits(tasks) if f is not None]
     if not fits:
         return None
     if base.candidates and not problem.effort.is_ensemble:
-        fits += _from_base(inquiry, base, fits, looked)
+        fits += _restarted_from_base(inquiry, base, fits, looked)
     fits.sort(key=lambda f: f.left)
     if not problem.effort.is_ensemble:
         fits = begun_otherwise(inquiry, base, fits, looked, shifts)
@@ -65,16 +81,16 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
         else alone
     )
     if near and problem.effort.polishes:
-        polished = inquiry.fits([from_there(f, "polish") for f in near])
+        polished = inquiry.fits([continued_from(f, "polish") for f in near])
         others = [f for f in fits if not any(f is one for one in near)]
         fits = others + [new or old for new, old in zip(polished, near, strict=True)]
-    fits = one_each(fits) if problem.effort.is_ensemble else shaped_too(inquiry, base, one_each(fits))
+    fits = best_of_each(fits) if problem.effort.is_ensemble else with_shapes(inquiry, base, best_of_each(fits))
     if not problem.effort.is_ensemble:
-        fits = timed_too(inquiry, base, fits)
-    if reweighted(problem, fits[0], inquiry.phases):
+        fits = with_time_shifts(inquiry, base, fits)
+    if with_noise_of_fit(problem, fits[0], inquiry.phases):
         base, fits = problem.again(base), [problem.again(f) for f in fits]
     if not problem.effort.is_ensemble:
-        fits = _by_fits(inquiry, fits)
+        fits = _refitted_where_slopes_mislead(inquiry, fits)
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     fits = simplest(fits, groups, problem.samples_per_error)
     least = min(f.left for f in fits)
@@ -87,24 +103,26 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
 
 
-def reused_of(problem: Problem, base: Fitted, few: Sequence[int] | None = None) -> tuple[Array, ...] | None:
+def reusable_slopes(problem: Problem, base: Fitted, few: Sequence[int] | None = None) -> tuple[Array, ...] | None:
     """Slopes (n, k) that a base has of each recording, or of `few`, for fits beside it; None where they cost no run."""
     if not problem.effort.is_ensemble or not base.candidates:
         return None
-    return tuple(base.blocks[r].plain_J for r in (range(len(base.blocks)) if few is None else few))
+    return tuple(base.blocks[r].unweighted_J for r in (range(len(base.blocks)) if few is None else few))
 
 
-def _by_fits(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
+def _refitted_where_slopes_mislead(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits, with what the one that leaves least foretells by fits, where by its slopes another foretells better."""
     groups = inquiry.groups
     lead, ahead = min(fits, key=lambda f: f.left), min(fits, key=lambda f: held_out(f, groups).left.sum())
     if lead is ahead:
         return list(fits)
-    new = refitted(inquiry.problem, lead, groups, held_out(ahead, groups).total, inquiry.executor.parallel_map)
+    new = cross_validated_by_refits(
+        inquiry.problem, lead, groups, held_out(ahead, groups).total, inquiry.executor.parallel_map
+    )
     return [new if f is lead else f for f in fits]
 
 
-def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest) -> list[Fitted]:
+def _restarted_from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest) -> list[Fitted]:
     """Fits anew, from the base itself, of candidates that were led astray: beside them more is left than without.
 
     Those that soon gain a part of what the best does are gone on with.
@@ -118,17 +136,17 @@ def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: S
             )
     short = [f for f in inquiry.fits(tasks) if f is not None]
     able = [f for f in short if base.left - f.total > TUNING.short_share * (base.left - least)]
-    ended = [f for f in inquiry.fits([from_there(f, "fit") for f in able]) if f is not None]
+    ended = [f for f in inquiry.fits([continued_from(f, "fit") for f in able]) if f is not None]
     return ended + [inquiry.problem.again(f) for f in short if not any(f is one for one in able)]
 
 
-def reweighted(problem: Problem, fitted: Fitted, phases: Phases) -> bool:
+def with_noise_of_fit(problem: Problem, fitted: Fitted, phases: Phases) -> bool:
     """Weigh the recordings by all that a fit leaves, if that is noise: as little as seen, or more without structure."""
     left, count = fitted.left, sum(b.residual.size for b in fitted.blocks)
     if left > TUNING.like_noise**2 * count:
         return False
     before = problem.dataset
-    problem.with_noise_model(autoregression.whole(before, problem.residuals(fitted)))
+    problem.with_noise_model(autoregression.with_noise_of_residuals(before, problem.residuals(fitted)))
     if left < TUNING.nearly_noise**2 * count:
         return True
     if (
@@ -158,7 +176,7 @@ def _first_fits(
     tasks = [
         Task(
             candidates=(*base.candidates, s.candidate), start=(*x, *start), shifts=at, only=tuple(few),
-            rounds=problem.effort.short, fixed_shifts=fixed_shifts, reused=reused_of(problem, base, few),
+            rounds=problem.effort.short, fixed_shifts=fixed_shifts, reused=reusable_slopes(problem, base, few),
         )
         for s in chosen.values()
         for start in s.starts
@@ -166,7 +184,7 @@ def _first_fits(
     ]  # fmt: skip
     far = [] if problem.heavy_tailed else [task for task in tasks if task.candidates[-1].key in looked.far]
     fits = [f for f in inquiry.fits([task for task in tasks if task not in far]) if f is not None]
-    fits += _smoothly(inquiry, far, few)
+    fits += _robust_short_fits(inquiry, far, few)
     for one in fits:
         key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
         told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
@@ -175,7 +193,7 @@ def _first_fits(
         f for k, f in enumerate(fits) if k < problem.effort.leaders or f.left < TUNING.followed_misfit * fits[0].left
     ]
     if problem.effort.is_ensemble and fits:
-        worth = one_each(worth) + _elsewhere(worth)
+        worth = best_of_each(worth) + _other_minimum(worth)
         before = [problem.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]  # clocks where they are held
         as_it_is = sum(b.total for b in before if b is not None)
         # and what leads by its score: the gain of one that others are measured by may be chance of its runs
@@ -201,7 +219,7 @@ def _elsewhere_of(base: Fitted) -> list[tuple[float, ...]]:
     return [(*at, *base.x[len(base.x) - effects :]) for c in base.candidates[: base.first] for at in c.places if held]
 
 
-def _smoothly(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[int]) -> list[Fitted]:
+def _robust_short_fits(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[int]) -> list[Fitted]:
     """Fits to few recordings with other courses forgiven, as they stand in full.
 
     Where runs part ways what is left in full leaps from place to place, and a fit ends at the first dip.
@@ -245,7 +263,7 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: ScoreTest) -> 
     return [*able, *(s for s in moving if s.candidate in related)]
 
 
-def _elsewhere(fits: Sequence[Fitted]) -> list[Fitted]:
+def _other_minimum(fits: Sequence[Fitted]) -> list[Fitted]:
     """Of the candidate that leads, best first, the best fit that came to another place."""
     lead = fits[0]
     same = [f for f in fits[1:] if f.candidates[-1].key == lead.candidates[-1].key]
@@ -256,15 +274,15 @@ def _elsewhere(fits: Sequence[Fitted]) -> list[Fitted]:
     ][:1]
 
 
-def moves(problem: Problem, base: Fitted, fitted: Fitted) -> float:
+def largest_change(problem: Problem, base: Fitted, fitted: Fitted) -> float:
     """How far the added effect moves any channel of any recording, largest root mean square over the range.
 
     Within half a step of a channel's digits nothing is told to have moved.
     """
-    return _apart(problem, base.blocks, fitted.blocks)
+    return _run_distance(problem, base.blocks, fitted.blocks)
 
 
-def does(problem: Problem, fitted: Fitted) -> float:
+def size_of_effect(problem: Problem, fitted: Fitted) -> float:
     """How far the last effect moves any channel beside the others as they stand; 0 where these cannot be simulated.
 
     What the others cannot be bent to of it is less: all that ground of another stiffness leaves of a rate, a tenth.
@@ -272,15 +290,15 @@ def does(problem: Problem, fitted: Fitted) -> float:
     last = fitted.candidates[-1]
     rest, x = fitted.candidates[:-1], fitted.x[: len(fitted.x) - len(last.search)]
     alone = [problem.block(r, rest, x, b.shift, 0.0) for r, b in enumerate(fitted.blocks)]
-    return 0.0 if None in alone else _apart(problem, [b for b in alone if b is not None], fitted.blocks)
+    return 0.0 if None in alone else _run_distance(problem, [b for b in alone if b is not None], fitted.blocks)
 
 
-def _apart(problem: Problem, some: Sequence[ResidualBlock], others: Sequence[ResidualBlock]) -> float:
-    """How far two lots of runs are apart in any channel of any recording, see `moves`."""
+def _run_distance(problem: Problem, some: Sequence[ResidualBlock], others: Sequence[ResidualBlock]) -> float:
+    """How far two lots of runs are apart in any channel of any recording, see `largest_change`."""
     most = 0.0
     for r, (a, b) in enumerate(zip(some, others, strict=True)):
         for signal, part in problem.dataset[r].spans():
-            d = (a.plain_residual - b.plain_residual)[part]
+            d = (a.unweighted_residual - b.unweighted_residual)[part]
             size = float(np.sqrt(np.mean(d * d))) * signal.sigma
             if size > 0.5 * signal.step:
                 most = max(most, size / signal.span)
@@ -297,7 +315,7 @@ def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitt
     near = [
         f
         for f in fits
-        if worse(f, fits[0], groups, shared)[0] < TUNING.simpler_errors
+        if held_out_disadvantage(f, fits[0], groups, shared)[0] < TUNING.simpler_errors
         or held_out(f, groups).left.sum() < (1.0 + TUNING.roughness) * least
     ]
     first = min(near, key=lambda f: len(f.x))
@@ -319,15 +337,15 @@ def confusion(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
         explains = base.left - rival.left > 0.5 * (base.left - best.left)
         as_well = len(rival.x) <= len(best.x) and rival.left < best.left + TUNING.excluded_errors**2
         becomes_best = (
-            len(rival.x) > len(best.x) and rival.left > best.left - TUNING.excluded_errors**2 and is_at_an_end(rival)
+            len(rival.x) > len(best.x) and rival.left > best.left - TUNING.excluded_errors**2 and ends_at_bound(rival)
         )
         if rival is best or becomes_best or not explains:
             continue
-        if as_well or min(worse(rival, best, groups, shared)) < TUNING.excluded_errors:
+        if as_well or min(held_out_disadvantage(rival, best, groups, shared)) < TUNING.excluded_errors:
             found.append(rival)
     return found
 
 
-def is_at_an_end(fitted: Fitted) -> bool:
+def ends_at_bound(fitted: Fitted) -> bool:
     """Whether a number of the last effect stands at an end of its range."""
     return any(at_an_end(v) for v in fitted.own)

@@ -23,7 +23,7 @@ class Both:
     along: tuple[float, float]
 
 
-def jointly(along: Array, cosines: Array, owners: Sequence[str]) -> list[Both]:
+def best_direction_pairs(along: Array, cosines: Array, owners: Sequence[str]) -> list[Both]:
     """The best two directions of each pair of owners, the pair that gains most first.
 
     With z (m,) the misfit along unit directions and c their cosines (m, m), two gain

@@ -10,21 +10,21 @@ from functools import partial
 from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.jobs import Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import turned
-from rollover.diagnosis.fit.local_search import few_of, shifts_told, without
+from rollover.diagnosis.fit.linearisation import first_effect_last
+from rollover.diagnosis.fit.local_search import completed_shifts, representative_recordings, without_effect
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
-from rollover.diagnosis.fit.threshold_scan import has_threshold, placed_beside, stretches
+from rollover.diagnosis.fit.threshold_scan import has_threshold, threshold_ranges, threshold_starts
 from rollover.diagnosis.inference.adequacy import is_enough
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.flexibility import is_over_flexible
-from rollover.diagnosis.selection.forward_step import reweighted, step
-from rollover.diagnosis.selection.restarts import from_there, shaped_too
+from rollover.diagnosis.selection.forward_step import step, with_noise_of_fit
+from rollover.diagnosis.selection.restarts import continued_from, with_shapes
 from rollover.diagnosis.selection.scan import look
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far
-from rollover.diagnosis.selection.simplification import followed, mirror_images, simpler, unbent
+from rollover.diagnosis.selection.simplification import followed, in_usual_shape, mirror_images, simpler
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
@@ -49,13 +49,13 @@ def best_subsets(
     found, left = followed(inquiry, pair)
     if not is_enough(problem, found.fitted, left) and any(c.rings for c in found.fitted.candidates):
         # what its shape shows now did not show beside another one
-        ringing = found.fitted if found.fitted.candidates[-1].rings else problem.again(turned(found.fitted))
-        other = swapped(inquiry, ringing)
+        ringing = found.fitted if found.fitted.candidates[-1].rings else problem.again(first_effect_last(found.fitted))
+        other = with_first_replaced(inquiry, ringing)
         if other is not None and other.fitted.left < found.fitted.left:
             found, left = followed(inquiry, other)
     if is_whole and costs(problem, found.fitted, current) > SETTINGS.selection.ensemble_validation.least_gain:
         return None  # noise that such a pair tells of would hold the third effect
-    if not is_enough(problem, found.fitted, left) and reweighted(problem, found.fitted, inquiry.phases):
+    if not is_enough(problem, found.fitted, left) and with_noise_of_fit(problem, found.fitted, inquiry.phases):
         found = found.again(problem)
         left = mismatch_of(problem.dataset, found.fitted.blocks, inquiry.phases)
     if not (
@@ -87,24 +87,26 @@ def is_better(other: Fitted, left: Mismatch, current: Fitted, *, scattered: bool
     return other.left - chance < part * (current.left - chance)
 
 
-def with_another_first(inquiry: Inquiry, taken: Sequence[Step], current: Fitted) -> tuple[list[Step], Mismatch] | None:
+def with_first_exchanged(
+    inquiry: Inquiry, taken: Sequence[Step], current: Fitted
+) -> tuple[list[Step], Mismatch] | None:
     """Two steps with the first effect given for another beside the second, and what they leave; None if not better."""
-    other = swapped(inquiry, taken[-1].fitted)
+    other = with_first_replaced(inquiry, taken[-1].fitted)
     if other is None or other.fitted.left >= taken[-1].fitted.left:
         return None
     found, left = followed(inquiry, other)
     return ([taken[-1], found], left) if is_better(found.fitted, left, current, scattered=True) else None
 
 
-def swapped(inquiry: Inquiry, current: Fitted) -> Step | None:
+def with_first_replaced(inquiry: Inquiry, current: Fitted) -> Step | None:
     """The first effect of an explanation taken out and looked for anew beside the rest: it comes back, or a better."""
     problem = inquiry.problem
-    rest = without(problem, current, current.first)
+    rest = without_effect(problem, current, current.first)
     if rest is None:
         return None
     looked = look(problem, rest, inquiry.free(rest), inquiry.groups, parallel_map=inquiry.executor.parallel_map)
     found = step(inquiry, rest, looked)
-    held = problem.again(turned(current))
+    held = problem.again(first_effect_last(current))
     if (
         found is None or found.fitted.left > held.left + SETTINGS.selection.ensemble_validation.least_gain
     ):  # on the way back nothing came as far
@@ -123,7 +125,7 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
     """
     problem, first = inquiry.problem, taken[0]
     lead = min(first.rivals, key=lambda f: f.left)
-    few, shifts = few_of(lead), tuple(b.shift for b in lead.blocks)
+    few, shifts = representative_recordings(lead), tuple(b.shift for b in lead.blocks)
     at, fixed_shifts = tuple(shifts[r] for r in few), is_far(problem, first.base)
     # slopes tell what two do together where these are not far off
     partners = _partners(inquiry, first, taken, looked, TUNING.scored if fixed_shifts else 0)
@@ -131,9 +133,9 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
     base = first.base
     short: list[Start] = [((*base.candidates, a, b), (*base.x, *x, *y)) for (a, x), (b, y) in two if _may_explain(a, b)]
     short += (
-        _placed_anew(inquiry, partners, few, shifts, (base.candidates, base.x))
+        _with_thresholds_scanned(inquiry, partners, few, shifts, (base.candidates, base.x))
         if fixed_shifts
-        else _together(inquiry, base, looked)
+        else _pairs_by_slopes(inquiry, base, looked)
     )
     inquiry.say(f"{len(short)} pairs of effects")
     for rounds, most in TUNING.short_fits:
@@ -145,18 +147,18 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
         short = [(f.candidates, f.x) for f in met]
     if not met or _takes_little(problem.again(lead), met[0], few):
         return None
-    tasks = [Task(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few)) for f in met]
+    tasks = [Task(candidates=f.candidates, start=f.x, shifts=completed_shifts(shifts, f, few)) for f in met]
     fits = [f for f in inquiry.fits(tasks) if f is not None]
     if not fits:
         return None
     best = min([*fits, *_in_tune(inquiry, fits), *_traced(inquiry, fits)], key=lambda f: f.left)
     best = min([best, *_mirrored(inquiry, best)], key=lambda f: f.left)
     if best.left < SETTINGS.fit.local_search.abandon_above * taken[-1].fitted.left:
-        ways = (best, problem.again(turned(best)))
+        ways = (best, problem.again(first_effect_last(best)))
         tasks = [Task(candidates=p.candidates[:-1], start=p.x[: -len(p.own)], shifts=shifts) for p in ways]
         for pair, alone in zip(ways, inquiry.fits(tasks), strict=True):
             if alone is not None:
-                best = min(best, *shaped_too(inquiry, alone, [pair]), key=lambda f: f.left)
+                best = min(best, *with_shapes(inquiry, alone, [pair]), key=lambda f: f.left)
     alone = problem.fit(best.candidates[:-1], best.x[: -len(best.own)], shifts=[b.shift for b in best.blocks])
     return None if alone is None else Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
 
@@ -166,14 +168,14 @@ def _may_explain(one: Candidate, other: Candidate) -> bool:
     return one.key != other.key and not is_over_flexible((one, other))
 
 
-def _together(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> list[Start]:
+def _pairs_by_slopes(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> list[Start]:
     """Pairs of candidates that gain most together by their slopes, in their usual shapes, from where these lead."""
     usual = {c.key: c for c in inquiry.candidates}
     begun = [(usual[key], x, usual[other], y) for (key, x), (other, y) in looked.both]
     return [((*base.candidates, a, b), (*base.x, *x, *y)) for a, x, b, y in begun if _may_explain(a, b)]
 
 
-def _placed_anew(
+def _with_thresholds_scanned(
     inquiry: Inquiry,
     partners: Sequence[tuple[Candidate, tuple[float, ...]]],
     few: Sequence[int],
@@ -186,7 +188,7 @@ def _placed_anew(
     """
     able = [c for c, _ in partners if has_threshold(c) and not c.is_bent]
     ways = [(a, x, c) for a, x in partners[: TUNING.leading] for c in able if c.key != a.key]
-    look = partial(placed_beside, few=tuple(few), shifts=tuple(shifts), base=base)
+    look = partial(threshold_starts, few=tuple(few), shifts=tuple(shifts), base=base)
     each = zip(ways, inquiry.parallel_map(look, ways), strict=True)
     return [((*base[0], a, c), x) for (a, _, c), x in each if x is not None]
 
@@ -208,11 +210,11 @@ def _in_tune(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
 
     With a wrong share of the nose all that stands beside it is met as badly, and the wrong one may lead.
     """
-    able = [f if f.candidates[-1].rings else inquiry.problem.again(turned(f)) for f in pairs if _rings(f)]
+    able = [f if f.candidates[-1].rings else inquiry.problem.again(first_effect_last(f)) for f in pairs if _rings(f)]
     lead = min(pairs, key=lambda f: f.left)
     near = [f for f in able if f.left < TUNING.same_misfit * lead.left and f.candidates[-1].shapes]
     leaves = tuple(b.total for b in lead.blocks)
-    made = inquiry.fits([replace(from_there(f, "shape"), leaves=leaves) for f in near])
+    made = inquiry.fits([replace(continued_from(f, "shape"), leaves=leaves) for f in near])
     return [f for f in made if f is not None]
 
 
@@ -228,9 +230,11 @@ def _traced(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
     ):
         return []
     near = (f for f in ranked if f.left < TUNING.placed_misfit * ranked[0].left)
-    ways = (way for f in near for way in (f, inquiry.problem.again(turned(f))))
-    able = itertools.islice((way for way in ways if stretches(way) and not way.candidates[-1].rings), TUNING.placed)
-    tasks = [replace(from_there(f, "trace"), stretch=s) for f in able for s in stretches(f)]
+    ways = (way for f in near for way in (f, inquiry.problem.again(first_effect_last(f))))
+    able = itertools.islice(
+        (way for way in ways if threshold_ranges(way) and not way.candidates[-1].rings), TUNING.placed
+    )
+    tasks = [replace(continued_from(f, "trace"), stretch=s) for f in able for s in threshold_ranges(f)]
     return [f for f in inquiry.fits(tasks) if f is not None]
 
 
@@ -240,11 +244,13 @@ def _mirrored(inquiry: Inquiry, pair: Fitted) -> list[Fitted]:
     That may have been bent to a stiffness of all the ground, as a rate by where it sets in.
     """
     usual, found = {c.key: c for c in inquiry.candidates}, []
-    for way in (pair, turned(pair)):
+    for way in (pair, first_effect_last(pair)):
         if not EFFECTS[way.candidates[-1].id].mirrors:
             continue
         other = way.candidates[0]
-        (other, _), x = unbent(way, usual, (0,) if usual[other.key].search.keys() <= other.search.keys() else ())
+        (other, _), x = in_usual_shape(
+            way, usual, (0,) if usual[other.key].search.keys() <= other.search.keys() else ()
+        )
         found += mirror_images(inquiry, way, (other,), x[: len(other.search)])
     return found
 

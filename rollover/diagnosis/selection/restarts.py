@@ -13,17 +13,17 @@ from rollover.diagnosis.fit.jobs import How, Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.local_search import (
-    along_secondary,
-    apart,
-    few_of,
     frequency_scan,
     grid_scan,
-    least_of,
     left_at,
+    representative_recordings,
+    separate_minima,
+    smallest_misfit,
+    starts_along_shape,
 )
 from rollover.diagnosis.fit.model_variants import enough, is_noise
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.threshold_scan import is_clock, stretches
+from rollover.diagnosis.fit.threshold_scan import is_clock, threshold_ranges
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
@@ -39,15 +39,15 @@ def begun_otherwise(
     """The fits, best first, with those that another beginning or another shape makes of what did not come far."""
     count = sum(b.residual.size for b in base.blocks)
     if fits[0].left > TUNING.rugged_above**2 * count:
-        return _but_for_some(inquiry, base, _combed(inquiry, fits, looked, shifts), looked, shifts)
-    return _as_promised(inquiry, base, fits, looked, shifts)
+        return _refit_on_few(inquiry, base, _damping_frequency_scan(inquiry, fits, looked, shifts), looked, shifts)
+    return _recheck_promising(inquiry, base, fits, looked, shifts)
 
 
-def _as_promised(
+def _recheck_promising(
     inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first, with those whose slopes lead and whose usual shape does not bear them out."""
-    gains = {f.candidates[-1].key: base.left - f.left for f in one_each(fits)}
+    gains = {f.candidates[-1].key: base.left - f.left for f in best_of_each(fits)}
     places = []
     for c in (c for c in inquiry.free(base) if c.shapes):
         score = looked.scores.get(c.key, 0.0)
@@ -56,10 +56,12 @@ def _as_promised(
             and gains.get(c.key, 0.0) < TUNING.promised_share * score
         ):
             places.append((c, (*base.x, *looked.starts.get(c.key, c.starts())[0])))
-    return _with_secondary(inquiry, base, fits, places, shifts)
+    return _with_shape_starts(inquiry, base, fits, places, shifts)
 
 
-def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]) -> list[Fitted]:
+def _damping_frequency_scan(
+    inquiry: Inquiry, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]
+) -> list[Fitted]:
     """The fits, best first, the best that rings begun anew along its damping and its frequency.
 
     It leads by what it leaves, or by its score: its frequency may have been found beside a wrong damping.
@@ -68,13 +70,16 @@ def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: ScoreTest, shifts:
     old = next((f for f in near if f.candidates[-1].rings and len(f.own) == 2), None)
     if old is None:
         return list(fits)
-    few = few_of(old)
-    begun = [(old.candidates, x) for x in apart(_met(inquiry, old.candidates, grid_scan(old), shifts, few))]
+    few = representative_recordings(old)
+    begun = [
+        (old.candidates, x)
+        for x in separate_minima(_ranked_places(inquiry, old.candidates, grid_scan(old), shifts, few))
+    ]
     begun += _by_frequency(inquiry, old, shifts, few)
     made = inquiry.fits([Task(candidates=c, start=x, shifts=tuple(shifts), width=1) for c, x in begun])
-    new = _plainest([f for f in made if f is not None] or [old], sum(b.residual.size for b in old.blocks))
+    new = _fewest_parameters([f for f in made if f is not None] or [old], sum(b.residual.size for b in old.blocks))
     for how in FOLLOWED:
-        new = inquiry.fits([from_there(new, how)])[0] or new
+        new = inquiry.fits([continued_from(new, how)])[0] or new
     better = new if new.left < old.left else old
     return sorted([better, *(f for f in fits if f is not old)], key=lambda f: f.left)
 
@@ -87,12 +92,17 @@ def _by_frequency(
     at = old.x[: len(old.x) - len(old.own)]
     whole, places = frequency_scan(last, old.own)
     candidates, worst = (*beside, whole), max(few, key=lambda r: old.blocks[r].total)
-    heard = _met(inquiry, candidates, [(*at, *own) for own in places], shifts, (worst,))[: TUNING.most_oscillations]
-    plain = [whole.plain(x[len(at) :]) for x in apart(_met(inquiry, candidates, [x for _, x in heard], shifts, few))]
+    heard = _ranked_places(inquiry, candidates, [(*at, *own) for own in places], shifts, (worst,))[
+        : TUNING.most_oscillations
+    ]
+    plain = [
+        whole.plain(x[len(at) :])
+        for x in separate_minima(_ranked_places(inquiry, candidates, [x for _, x in heard], shifts, few))
+    ]
     return [((*beside, c), (*at, *own)) for c, own in plain]
 
 
-def _met(
+def _ranked_places(
     inquiry: Inquiry,
     candidates: Sequence[Candidate],
     places: Sequence[tuple[float, ...]],
@@ -100,12 +110,12 @@ def _met(
     few: Sequence[int],
 ) -> list[tuple[float, tuple[float, ...]]]:
     """What is left of `few` recordings at those of some places that can be simulated, with these, the least first."""
-    look = partial(_left_of, candidates=tuple(candidates), shifts=tuple(shifts), few=tuple(few))
+    look = partial(_misfit_of_few, candidates=tuple(candidates), shifts=tuple(shifts), few=tuple(few))
     met = zip(inquiry.parallel_map(look, places), places, strict=True)
     return sorted((there, x) for there, x in met if there is not None)
 
 
-def _left_of(
+def _misfit_of_few(
     problem: Problem,
     x: tuple[float, ...],
     *,
@@ -117,7 +127,7 @@ def _left_of(
     return left_at(problem, candidates, x, shifts, few)
 
 
-def _but_for_some(
+def _refit_on_few(
     inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first, with those whose shape may be wrong for a few recordings alone, fitted together with it.
@@ -131,10 +141,10 @@ def _but_for_some(
     look = partial(_best_middle, beside=base.candidates, shifts=tuple(shifts), most=most)
     met = zip(able, inquiry.parallel_map(look, list(zip(able, begun, strict=True))), strict=True)
     places = [(c, x) for c, x in met if x is not None]
-    return _with_secondary(inquiry, base, fits, places, shifts)
+    return _with_shape_starts(inquiry, base, fits, places, shifts)
 
 
-def _with_secondary(
+def _with_shape_starts(
     inquiry: Inquiry,
     base: Fitted,
     fits: Sequence[Fitted],
@@ -146,9 +156,9 @@ def _with_secondary(
     They are begun where least is left all along each parameter of the shape. One that comes nowhere near what the best
     fit leaves is not gone on with.
     """
-    sets = [((*base.candidates, c.whole()), along_secondary(c, x)) for c, x in places]
+    sets = [((*base.candidates, c.whole()), starts_along_shape(c, x)) for c, x in places]
     parts = [(candidates, tuple(every[k :: TUNING.parts])) for candidates, every in sets for k in range(TUNING.parts)]
-    met = inquiry.parallel_map(partial(least_of, shifts=tuple(shifts)), parts)
+    met = inquiry.parallel_map(partial(smallest_misfit, shifts=tuple(shifts)), parts)
     tasks = []
     for k, (candidates, _) in enumerate(sets):
         least = min((one for one in met[k * TUNING.parts : (k + 1) * TUNING.parts] if one is not None), default=None)
@@ -156,7 +166,7 @@ def _with_secondary(
             tasks.append(Task(candidates=candidates, start=least[1], shifts=tuple(shifts), width=1))
     begun = [f for f in inquiry.fits(tasks) if f is not None]
     near = [f for f in begun if f.left <= SETTINGS.fit.local_search.abandon_above * fits[0].left]
-    followed = zip(inquiry.fits([from_there(f, "polish") for f in near]), near, strict=True)
+    followed = zip(inquiry.fits([continued_from(f, "polish") for f in near]), near, strict=True)
     others = [f for f in begun if not any(f is one for one in near)]
     return sorted([*fits, *others, *(new or old for new, old in followed)], key=lambda f: f.left)
 
@@ -202,7 +212,7 @@ def _per_sample(block: ResidualBlock) -> float:
     return block.normal()[2] / block.residual.size
 
 
-def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+def with_shapes(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits with shapes fitted too where that pays, best first; other forms if the best leaves more than chance.
 
     Of an effect that takes next to nothing from what the base leaves no shape or form will take it all.
@@ -216,8 +226,8 @@ def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[F
         is_near = f.left < TUNING.shaped_misfit * best or ahead < TUNING.shaped_misfit * min(held)
         if not is_near or base.left - f.left < TUNING.least_share * (base.left - size):
             continue
-        tasks = [from_there(f, "shape")] if f.candidates[-1].shapes else []
-        tasks += [] if is_whole else [replace(from_there(f, "shape"), form=c) for c in f.candidates[-1].forms()]
+        tasks = [continued_from(f, "shape")] if f.candidates[-1].shapes else []
+        tasks += [] if is_whole else [replace(continued_from(f, "shape"), form=c) for c in f.candidates[-1].forms()]
         ways += [(k, replace(task, leaves=tuple(b.total for b in lead.blocks))) for task in tasks]
     made: dict[int, list[Fitted]] = {}
     for (k, _), new in zip(ways, _polished(inquiry, inquiry.fits([task for _, task in ways]), best), strict=True):
@@ -225,7 +235,7 @@ def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[F
             made.setdefault(k, []).append(new)
     found = list(fits)
     for k, several in made.items():
-        new = _plainest(several, size)
+        new = _fewest_parameters(several, size)
         if new.left < fits[k].left - enough(best, size):
             found[k] = new
     return sorted(found, key=lambda f: f.left)
@@ -239,19 +249,19 @@ def _polished(inquiry: Inquiry, fits: Sequence[Fitted | None], best: float) -> l
         for f in fits
         if f is not None and f.candidates[-1].form and f.left < TUNING.leading_misfit * least and not is_noise(f)
     ]
-    followed = inquiry.fits([from_there(f, "polish") for f in near])
+    followed = inquiry.fits([continued_from(f, "polish") for f in near])
     better = {id(old): new for old, new in zip(near, followed, strict=True)}
     return [better.get(id(f)) or f for f in fits]
 
 
-def _plainest(fits: Sequence[Fitted], size: int) -> Fitted:
+def _fewest_parameters(fits: Sequence[Fitted], size: int) -> Fitted:
     """Of an effect in several forms the one that asks for least, of those that meet all as well."""
     least = min(f.left for f in fits)
     near = [f for f in fits if f.left < least + enough(least, size)]
     return min(near, key=lambda f: (len(f.x), bool(f.candidates[-1].form), f.left))
 
 
-def timed_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+def with_time_shifts(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits, the near ones with their time shifts tried out, and clocks all along their range, best first.
 
     Beside what is hardly met at all everything is near: an effect must gain a share of what the best does.
@@ -263,12 +273,12 @@ def timed_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fi
         if f.left < TUNING.tied_misfit * least and base.left - f.left >= TUNING.least_share * (base.left - least)
     ]
     others = [f for f in fits if not any(f is one for one in near)]
-    traced = [traced_too(inquiry, f) if is_clock(f) else f for f in near]
-    timed = [new or f for new, f in zip(inquiry.fits([from_there(f, "time") for f in traced]), traced, strict=True)]
-    return sorted(clocked_alike(inquiry, timed) + others, key=lambda f: f.left)
+    traced = [with_thresholds_traced(inquiry, f) if is_clock(f) else f for f in near]
+    timed = [new or f for new, f in zip(inquiry.fits([continued_from(f, "time") for f in traced]), traced, strict=True)]
+    return sorted(with_common_time_shifts(inquiry, timed) + others, key=lambda f: f.left)
 
 
-def clocked_alike(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
+def with_common_time_shifts(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits; some recordings at the time shifts of the one that leaves least, where that is better; never worse.
 
     Edges leave a shift in the first dip of many, and a recording's clock is the same whatever is missing.
@@ -277,7 +287,7 @@ def clocked_alike(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
         return list(fits)
     lead = min(fits, key=lambda f: f.left)
     shifts = [_shifts_beside(inquiry.problem, f, lead) for f in fits]
-    tasks = {k: replace(from_there(fits[k], "time"), shifts=s) for k, s in enumerate(shifts) if s is not None}
+    tasks = {k: replace(continued_from(fits[k], "time"), shifts=s) for k, s in enumerate(shifts) if s is not None}
     found = dict(zip(tasks, inquiry.fits(list(tasks.values())), strict=True))
     return [min((f, found.get(k) or f), key=lambda one: one.left) for k, f in enumerate(fits)]
 
@@ -293,18 +303,18 @@ def _shifts_beside(problem: Problem, fitted: Fitted, lead: Fitted) -> tuple[floa
     return tuple(shifts) if any(s != b.shift for s, b in zip(shifts, fitted.blocks, strict=True)) else None
 
 
-def traced_too(inquiry: Inquiry, fitted: Fitted) -> Fitted:
+def with_thresholds_traced(inquiry: Inquiry, fitted: Fitted) -> Fitted:
     """The fit, or a better one begun where a threshold of its last effect lies elsewhere."""
-    begun = inquiry.fits([replace(from_there(fitted, "trace"), stretch=s) for s in stretches(fitted)])
+    begun = inquiry.fits([replace(continued_from(fitted, "trace"), stretch=s) for s in threshold_ranges(fitted)])
     return min([fitted, *(f for f in begun if f is not None)], key=lambda f: f.left)
 
 
-def from_there(f: Fitted, how: How) -> Task:
+def continued_from(f: Fitted, how: How) -> Task:
     """What is made of a fit where it stands."""
     return Task(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
 
 
-def one_each(fits: Sequence[Fitted]) -> list[Fitted]:
+def best_of_each(fits: Sequence[Fitted]) -> list[Fitted]:
     """The best fit of each candidate."""
     best: dict[str, Fitted] = {}
     for f in sorted(fits, key=lambda f: f.left):

@@ -13,9 +13,9 @@ from rollover.diagnosis.fit.local_search import left_at
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 from rollover.diagnosis.fit.step import Groups
-from rollover.diagnosis.selection.ensemble_validation import unbent
+from rollover.diagnosis.selection.ensemble_validation import with_shifts_near_prior
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value, score_test
-from rollover.diagnosis.selection.screening import begun, spread
+from rollover.diagnosis.selection.screening import initial_time_shifts, representative_few
 from rollover.diagnosis.settings import SETTINGS
 
 TUNING = SETTINGS.selection.scan
@@ -43,8 +43,8 @@ def look(
         return score_test(problem, base, candidates, parallel_map=parallel_map)
     problem, base = problem.beginning(base)
     if problem.samples_per_error == 1.0:  # beside a tolerance it cannot be told what a clock has eaten
-        base = unbent(problem, base)
-    few, more = few or spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
+        base = with_shifts_near_prior(problem, base)
+    few, more = few or representative_few(base, groups, effort.few), representative_few(base, groups, effort.looked_at)
     first, last = _step_reduced(problem, base, candidates, few, more, beside)
     if problem.heavy_tailed:
         return last
@@ -59,12 +59,12 @@ def look(
         if p_value(masked.scores.get(c.key, 0.0), masked.null) < SETTINGS.selection.ensemble_validation.own_p_value
     ]
     scores = {key: max(score, masked.scores.get(key, 0.0)) for key, score in scores.items()}
-    far = strongly(problem, base, moving, few) if beside is None else {}
+    far = strong_starts(problem, base, moving, few) if beside is None else {}
     leading = [key for both in zip_longest(far, able[: effort.leaders]) for key in both if key is not None]
     return replace(last, scores=scores, leading=tuple(dict.fromkeys(leading)), far=far)
 
 
-def strongly(
+def strong_starts(
     problem: Problem, base: Fitted, candidates: Sequence[Candidate], few: Sequence[int]
 ) -> dict[str, tuple[tuple[float, ...], ...]]:
     """Where those candidates act that leave least of `few` recordings where they act strongly, by key, the best first.
@@ -72,7 +72,7 @@ def strongly(
     What so strong an effect does is no multiple of what a little of it does: a vehicle rolls on, or no more. Where all
     samples count in full what comes near is told best, with other courses forgiven what is still far off.
     """
-    shifts = begun(problem, base)
+    shifts = initial_time_shifts(problem, base)
 
     def left(way: Sequence[Candidate], x: Sequence[float], use: Sequence[int]) -> float:
         found = left_at(problem, (*base.candidates, *way), (*base.x, *x), shifts, use)
@@ -135,7 +135,7 @@ def _step_reduced(
     )
 
 
-def look_again(
+def rescored(
     problem: Problem,
     current: Fitted,
     base: Fitted | None,

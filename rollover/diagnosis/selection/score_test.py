@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.linearisation import without_shift
+from rollover.diagnosis.fit.linearisation import without_shift_direction
 from rollover.diagnosis.fit.parameterisation import (
     Candidate,
     followed,
     is_limit,
-    zero_of,
+    null_of,
 )
 from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 from rollover.diagnosis.noise.ensemble import gained
-from rollover.diagnosis.selection.pair_score import jointly
+from rollover.diagnosis.selection.pair_score import best_direction_pairs
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
@@ -89,8 +89,10 @@ def score_test(
     """
     at, use = beside or base, list(range(len(base.blocks))) if only is None else list(only)
     blocks = [base.blocks[r] for r in use]
-    misfit = np.concatenate([without_shift((b.residual + b.shift * b.slope)[:, None], b)[:, 0] for b in blocks])
-    held = np.concatenate([without_shift(b.J, b) for b in blocks]) if base.x else np.zeros((misfit.size, 0))
+    misfit = np.concatenate(
+        [without_shift_direction((b.residual + b.shift * b.slope)[:, None], b)[:, 0] for b in blocks]
+    )
+    held = np.concatenate([without_shift_direction(b.J, b) for b in blocks]) if base.x else np.zeros((misfit.size, 0))
     own, _ = np.linalg.qr(held)
     columns, seen_at, sizes = [], [], []
     quiet = _before_the_impact(problem, use)
@@ -112,10 +114,10 @@ def score_test(
         return ScoreTest(score=0.0, scores={}, null=np.zeros(TUNING.draws), detectable={})
     D = np.stack(columns, axis=1)
     misfit = misfit - own @ (own.T @ misfit)
-    along, scores = _best_along(misfit, D, blocks)
-    scores = scores / (1.0 + _trust(problem, blocks, use, D))
+    along, scores = _best_amplitude(misfit, D, blocks)
+    scores = scores / (1.0 + _ensemble_variance(problem, blocks, use, D))
     if any(problem.dataset[r].perturbed for r in use):
-        scores = scores / _at_odds(misfit, D, [b.residual.size for b in blocks])
+        scores = scores / _birge_ratio(misfit, D, [b.residual.size for b in blocks])
     detectable: dict[str, float] = {}
     own_best: dict[str, float] = {}
     ways: dict[str, list[tuple[float, ...]]] = {}
@@ -133,13 +135,15 @@ def score_test(
             ways[c.key].append(start)
     cosines = D.T @ D
     both = []
-    for pair in [] if problem.effort.is_ensemble else jointly(along, cosines, [c.key for c, _ in seen_at]):
-        one, other = (_led(*seen_at[k], far / sizes[k]) for k, far in zip(pair.places, pair.along, strict=True))
+    for pair in [] if problem.effort.is_ensemble else best_direction_pairs(along, cosines, [c.key for c, _ in seen_at]):
+        one, other = (
+            _scaled_start(*seen_at[k], far / sizes[k]) for k, far in zip(pair.places, pair.along, strict=True)
+        )
         both.append((one, other))
     return ScoreTest(
         score=float(scores.max()),
         scores=own_best,
-        null=null_by(cosines),
+        null=null_from_gram(cosines),
         detectable=detectable,
         starts={key: tuple(each) for key, each in ways.items()},
         only=tuple(only or ()),
@@ -157,12 +161,12 @@ def _before_the_impact(problem: Problem, use: Sequence[int]) -> Array | None:
     return None if stacked.all() or not stacked.any() else stacked
 
 
-def _led(c: Candidate, x: tuple[float, ...], factor: float) -> Place:
+def _scaled_start(c: Candidate, x: tuple[float, ...], factor: float) -> Place:
     """Where a direction leads: `factor` times as strong as at x, or x itself where there is no zero to go from."""
     return c.key, followed(c, x, factor) or x
 
 
-def _best_along(misfit: Array, D: Array, blocks: Sequence[ResidualBlock]) -> tuple[Array, Array]:
+def _best_amplitude(misfit: Array, D: Array, blocks: Sequence[ResidualBlock]) -> tuple[Array, Array]:
     """How far along each unit direction (n, m) is best, (m,), and what that gains, (m,), noise units.
 
     z and z^2, z = d'n, where all samples count in full. Where recordings took another course more may be gained further
@@ -194,7 +198,7 @@ def _stacked(sizes: Sequence[int]) -> list[slice]:
     return [slice(int(end - n), int(end)) for end, n in zip(np.cumsum(sizes), sizes, strict=True)]
 
 
-def _at_odds(misfit: Array, D: Array, sizes: Sequence[int]) -> Array:
+def _birge_ratio(misfit: Array, D: Array, sizes: Sequence[int]) -> Array:
     """How far recordings of `sizes` rows disagree on how much there is of each direction (n, m): Birge's ratio, (m,).
 
     With a_r = d_r'w_r/|d_r|^2 the amplitude by recording r and a that by all, sum_r |d_r|^2 (a_r - a)^2 over the number
@@ -207,15 +211,15 @@ def _at_odds(misfit: Array, D: Array, sizes: Sequence[int]) -> Array:
     return np.asarray(np.maximum(1.0, apart / max(len(parts) - 1, 1)))
 
 
-def _trust(problem: Problem, blocks: Sequence[ResidualBlock], use: Sequence[int], D: Array) -> Array:
+def _ensemble_variance(problem: Problem, blocks: Sequence[ResidualBlock], use: Sequence[int], D: Array) -> Array:
     """Variance along each direction (n, m) of what runs that nobody could tell apart differ by, (m,), noise units."""
     many = min((len(problem.dataset[r].perturbed) for r in use), default=0)
     found = np.zeros(D.shape[1])
     for k in range(many):
         perturbed = [
-            without_shift(block.counted(problem.dataset[r].whitened(problem.dataset[r].perturbed[k]))[:, None], block)[
-                :, 0
-            ]
+            without_shift_direction(
+                block.counted(problem.dataset[r].whitened(problem.dataset[r].perturbed[k]))[:, None], block
+            )[:, 0]
             for r, block in zip(use, blocks, strict=True)
         ]
         found += (D.T @ np.concatenate(perturbed)) ** 2
@@ -241,7 +245,7 @@ def _direction(
         d = problem.moved(r, at, ((*at[0], c), (*at[1], *x)), block.shift)
         if d is None:
             return None
-        found.append(without_shift(block.counted(d)[:, None], block)[:, 0])
+        found.append(without_shift_direction(block.counted(d)[:, None], block)[:, 0])
     return np.concatenate(found)
 
 
@@ -250,22 +254,22 @@ def _visible(c: Candidate, x: Sequence[float], size: float) -> float | None:
 
     Of a limit its value at x if that shows, else None; so where no value is known to be none.
     """
-    name, zero = zero_of(c)
+    name, zero = null_of(c)
     value = c.values(x)[name]
     if zero is not None:
         return abs(value - zero) * TUNING.visible / size
     return value if is_limit(c) and size >= TUNING.visible else None
 
 
-def null_of_the_best(directions: Sequence[Array], draws: int = TUNING.draws, seed: int = 0) -> Array:
+def null_of_maximum(directions: Sequence[Array], draws: int = TUNING.draws, seed: int = 0) -> Array:
     """Largest gain on noise (draws,), sorted; `directions` are, for each recording, arrays (n_r, m)."""
     m = directions[0].shape[1] if len(directions) else 0
     if m == 0:
         return np.zeros(draws)
-    return null_by(sum((np.asarray(d).T @ np.asarray(d) for d in directions), np.zeros((m, m))), draws, seed)
+    return null_from_gram(sum((np.asarray(d).T @ np.asarray(d) for d in directions), np.zeros((m, m))), draws, seed)
 
 
-def null_by(G: Array, draws: int = TUNING.draws, seed: int = 0) -> Array:
+def null_from_gram(G: Array, draws: int = TUNING.draws, seed: int = 0) -> Array:
     """The same by the scalar products of the directions (m, m)."""
     m = len(G)
     size = np.sqrt(np.maximum(np.diag(G), 1e-300))

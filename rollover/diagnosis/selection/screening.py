@@ -10,11 +10,11 @@ import numpy as np
 
 from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.linearisation import without_shift
+from rollover.diagnosis.fit.linearisation import without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate, same_family
 from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 from rollover.diagnosis.fit.step import Screened
-from rollover.diagnosis.fit.time_shift import by_first_contact
+from rollover.diagnosis.fit.time_shift import shifts_from_contact
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
@@ -23,7 +23,9 @@ from rollover.diagnosis.settings.forward import Effort
 TUNING = SETTINGS.selection.screening
 
 
-def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = SETTINGS.forward.drops.few) -> list[int]:
+def representative_few(
+    base: Fitted, groups: Sequence[Sequence[int]], few: int = SETTINGS.forward.drops.few
+) -> list[int]:
     """Few recordings that stand for all: of the conditions that are met worst, best, and in the middle."""
     left = [b.normal()[2] / b.residual.size for b in base.blocks]
     members = [max(g, key=lambda r: left[r]) for g in groups if g]
@@ -39,7 +41,7 @@ def is_far(problem: Problem, base: Fitted) -> bool:
     return base.left > far**2 * sum(b.residual.size for b in base.blocks)
 
 
-def begun(problem: Problem, base: Fitted, parallel_map: ParallelMap = serial_map) -> list[float]:
+def initial_time_shifts(problem: Problem, base: Fitted, parallel_map: ParallelMap = serial_map) -> list[float]:
     """Time shifts (s) to begin with: where the base is off its own are bent by what is missing, the contact's hardly.
 
     Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left.
@@ -52,7 +54,7 @@ def begun(problem: Problem, base: Fitted, parallel_map: ParallelMap = serial_map
     elif base.left < TUNING.biased_shifts**2 * count:
         return [b.shift for b in base.blocks]
     else:
-        told = by_first_contact(problem, base.candidates, base.x, parallel_map)
+        told = shifts_from_contact(problem, base.candidates, base.x, parallel_map)
     return [
         at if at is not None else b.shift if e.recording.clock.zero == "unknown" else 0.0
         for at, b, e in zip(told, base.blocks, problem.dataset, strict=True)
@@ -120,8 +122,8 @@ def _screened(
                 break
             count += 1
             left += there.normal()[2]
-            way = block.counted(block.plain_residual - there.plain_residual)
-            free = without_shift(np.column_stack([way, block.residual]), block)
+            way = block.counted(block.unweighted_residual - there.unweighted_residual)
+            free = without_shift_direction(np.column_stack([way, block.residual]), block)
             along += float(free[:, 0] @ free[:, 1])
             size += float(free[:, 0] @ free[:, 0])
         if count < len(blocks):

@@ -7,15 +7,15 @@ from dataclasses import replace
 
 from rollover.diagnosis.fit.jobs import Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import turned
-from rollover.diagnosis.fit.local_search import ended, polish, timed, without
-from rollover.diagnosis.fit.parameterisation import Candidate, coordinates, each_with_own
+from rollover.diagnosis.fit.linearisation import first_effect_last
+from rollover.diagnosis.fit.local_search import ended, polish, with_time_shift_search, without_effect
+from rollover.diagnosis.fit.parameterisation import Candidate, coordinates, with_slices
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.flexibility import is_over_flexible
-from rollover.diagnosis.selection.forward_step import is_at_an_end
-from rollover.diagnosis.selection.restarts import from_there, traced_too
+from rollover.diagnosis.selection.forward_step import ends_at_bound
+from rollover.diagnosis.selection.restarts import continued_from, with_thresholds_traced
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
@@ -35,14 +35,14 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     if problem.effort.is_ensemble or not is_near:
         return found, left
     if not is_over_flexible(old.effects):  # as they stand these will be refused, however well they fit
-        new = traced_too(inquiry, old)
+        new = with_thresholds_traced(inquiry, old)
         if new.left < old.left or len(old.effects) > 1 or left.p_value < TUNING.full_p_value:
-            new = timed(problem, polish(problem, new))
+            new = with_time_shift_search(problem, polish(problem, new))
         new = ended(problem, new)
         if new.left < old.left:
             found = _with_rivals(inquiry, found.moved_to(new))
             left = mismatch_of(problem.dataset, new.blocks, phases)
-    for simple in (simpler, _straightened, plainer):
+    for simple in (simpler, _in_usual_shapes, with_fewer_parameters):
         other = simple(inquiry, found)
         if other is not None:
             found, left = other, mismatch_of(problem.dataset, other.fitted.blocks, phases)
@@ -56,8 +56,8 @@ def simpler(inquiry: Inquiry, found: Step) -> Step | None:
     its own tells nothing, as it stands at such an end. What has fewer numbers is begun beside what stands beside it.
     """
     best, beside, shared = found.fitted, *_shared(found.fitted)
-    begun = list(_become(inquiry, best))
-    if is_at_an_end(best):
+    begun = list(_limiting_effects(inquiry, best))
+    if ends_at_bound(best):
         able = sorted(found.rivals, key=lambda f: f.left)
         able = [f for f in able if len(f.own) < len(best.own) and f.left < found.base.left][: TUNING.simpler_rivals]
         begun += [((*beside, f.candidates[-1]), f.own) for f in able]
@@ -66,7 +66,7 @@ def simpler(inquiry: Inquiry, found: Step) -> Step | None:
     one = min((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.left, default=None)
     if one is None or not _is_as_good(one, best):
         return None
-    return _led_by(one, found)
+    return _with_best(one, found)
 
 
 def _shared(fitted: Fitted) -> tuple[tuple[Candidate, ...], tuple[float, ...]]:
@@ -74,7 +74,7 @@ def _shared(fitted: Fitted) -> tuple[tuple[Candidate, ...], tuple[float, ...]]:
     return fitted.candidates[:-1], tuple(fitted.x[: len(fitted.x) - len(fitted.own)])
 
 
-def _become(inquiry: Inquiry, best: Fitted) -> Iterator[tuple[tuple[Candidate, ...], tuple[float, ...]]]:
+def _limiting_effects(inquiry: Inquiry, best: Fitted) -> Iterator[tuple[tuple[Candidate, ...], tuple[float, ...]]]:
     """What the last effect of a fit becomes at an end of its range, beside the others, and where that would stand."""
     *others, last = best.candidates
     values, kinds = last.values(best.own), EFFECTS[last.id].becomes
@@ -99,7 +99,7 @@ def _with_rivals(inquiry: Inquiry, found: Step) -> Step:
     return replace(found, rivals=tuple(rivals))
 
 
-def _straightened(inquiry: Inquiry, found: Step) -> Step | None:
+def _in_usual_shapes(inquiry: Inquiry, found: Step) -> Step | None:
     """A step of several effects with those in their usual shape that need no other beside each other; None if none.
 
     What had to be bent to do another's work as well is straight again once that stands beside it.
@@ -109,14 +109,16 @@ def _straightened(inquiry: Inquiry, found: Step) -> Step | None:
     if len(best.effects) < 2 or not bent:
         return None
     shifts, ways = tuple(b.shift for b in best.blocks), [bent, *([k] for k in bent if len(bent) > 1)]
-    tasks = [Task(candidates=c, start=x, shifts=shifts, width=1) for c, x in (unbent(best, usual, w) for w in ways)]
+    tasks = [
+        Task(candidates=c, start=x, shifts=shifts, width=1) for c, x in (in_usual_shape(best, usual, w) for w in ways)
+    ]
     fits = [f for f in inquiry.fits(tasks) if f is not None and _is_as_good(f, best)]
     if not fits:
         return None
-    return _led_by(min(fits, key=lambda f: (len(f.x), f.left)), found)
+    return _with_best(min(fits, key=lambda f: (len(f.x), f.left)), found)
 
 
-def plainer(inquiry: Inquiry, found: Step) -> Step | None:
+def with_fewer_parameters(inquiry: Inquiry, found: Step) -> Step | None:
     """A step by any effect of fewer numbers, but a sensor's, that does as well beside the others; None if none.
 
     Two thresholds in one place do the work of one and a stiffness: of either. The way there is crooked: all others move
@@ -131,8 +133,8 @@ def _ways(problem: Problem, found: Step) -> Iterator[Step]:
     yield found
     each = found.fitted.effects
     if len(each) == 2 and len({c.family for c in each}) == 1 and all(len(c.search) > 1 for c in each):
-        around = turned(found.fitted)
-        base = without(problem, around, around.first + 1)
+        around = first_effect_last(found.fitted)
+        base = without_effect(problem, around, around.first + 1)
         if base is not None:
             yield Step(base=base, fitted=around, p_value=found.p_value, rivals=(around,))
 
@@ -154,15 +156,15 @@ def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
         for c in able
     ]
     short = sorted((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.total)[: TUNING.simpler_effects]
-    whole = inquiry.fits([from_there(f, "fit") for f in short])
+    whole = inquiry.fits([continued_from(f, "fit") for f in short])
     one = min((f for f in whole if f is not None), key=lambda f: f.left, default=None)
     if one is None or one.left > SETTINGS.selection.restarts.leading_misfit * best.left:
         return None
-    one = inquiry.fits([from_there(one, "polish")])[0] or one
-    return _led_by(one, found) if _is_as_good(one, best) else None
+    one = inquiry.fits([continued_from(one, "polish")])[0] or one
+    return _with_best(one, found) if _is_as_good(one, best) else None
 
 
-def mirrored(inquiry: Inquiry, found: Step) -> Step:
+def with_mirror_rivals(inquiry: Inquiry, found: Step) -> Step:
     """A step of several effects with what mirrors its last one among its rivals, begun where it would do the same.
 
     The others have to move for that, so far that no look comes there.
@@ -201,13 +203,13 @@ def _mirrors(
             yield c, coordinates(there, c.search)
 
 
-def unbent(
+def in_usual_shape(
     fitted: Fitted, usual: Mapping[str, Candidate], which: Sequence[int]
 ) -> tuple[tuple[Candidate, ...], tuple[float, ...]]:
     """Effects of a fit, `which` of them in their usual shape, and where they stand."""
     candidates: list[Candidate] = []
     x: list[float] = []
-    for k, (c, own) in enumerate(each_with_own(fitted.candidates)):
+    for k, (c, own) in enumerate(with_slices(fitted.candidates)):
         if k in which:
             values, c = c.values(fitted.x[own]), usual[c.key]
             x += coordinates(values, c.search)
@@ -217,7 +219,7 @@ def unbent(
     return tuple(candidates), tuple(x)
 
 
-def _led_by(new: Fitted, found: Step) -> Step:
+def _with_best(new: Fitted, found: Step) -> Step:
     """A step with another fit for its best, which is none of its rivals any more, nor is what was of that effect."""
     same = new.candidates[-1].key
     others = (f for f in found.rivals if f is not found.fitted and f.candidates[-1].key != same)

@@ -7,18 +7,27 @@ from dataclasses import dataclass
 from typing import TypeGuard
 
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.local_search import conditioned, is_doubtful, timed
+from rollover.diagnosis.fit.local_search import (
+    has_uncertain_conditions,
+    refitted_with_conditions,
+    with_time_shift_search,
+)
 from rollover.diagnosis.fit.step import Phases, Step
-from rollover.diagnosis.fit.time_shift import is_all_by_clocks
+from rollover.diagnosis.fit.time_shift import is_explained_by_clocks
 from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
-from rollover.diagnosis.noise.ensemble import is_other
+from rollover.diagnosis.noise.ensemble import took_other_course
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.ensemble_validation import astray, backed, begun_anew, ensemble_validated
+from rollover.diagnosis.selection.ensemble_validation import (
+    ensemble_validated,
+    restarted_base,
+    with_full_weights,
+    without_unsupported_rivals,
+)
 from rollover.diagnosis.selection.flexibility import is_over_flexible
-from rollover.diagnosis.selection.forward_step import does, moves, reweighted, step
-from rollover.diagnosis.selection.pairs import best_subsets, with_another_first
-from rollover.diagnosis.selection.scan import look, look_again
+from rollover.diagnosis.selection.forward_step import largest_change, size_of_effect, step, with_noise_of_fit
+from rollover.diagnosis.selection.pairs import best_subsets, with_first_exchanged
+from rollover.diagnosis.selection.scan import look, rescored
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.simplification import followed
 from rollover.diagnosis.settings import SETTINGS
@@ -52,28 +61,26 @@ class Taken:
         return sum(b.residual.size for b in self.base.blocks)
 
 
-def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pairs: bool = True) -> Taken:
+def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pairs: bool = True) -> Taken:
     """Up to three effects, one after another beside the base; it goes on from the steps `begun`, if any.
 
     Two that leave more than noise are given for the best of all `pairs`, if these are to be tried.
     """
     problem, candidates, groups, phases = inquiry.problem, inquiry.candidates, inquiry.groups, inquiry.phases
     count = sum(b.residual.size for b in base.blocks)
-    clocked = begun_anew if problem.effort.is_ensemble else timed
+    clocked = restarted_base if problem.effort.is_ensemble else with_time_shift_search
     base = clocked(problem, base)  # what a clock leaves is no noise,
-    if reweighted(problem, base, phases):
+    if with_noise_of_fit(problem, base, phases):
         base = problem.again(base)
     base = clocked(problem, base)  # and no effect's gain
     before = mismatch_of(problem.dataset, base.blocks, phases)
-    base = astray(problem, base)
+    base = with_full_weights(problem, base)
     inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
     looked = first_look = look(problem, base, candidates, groups, parallel_map=inquiry.executor.parallel_map)
 
     def beside(fitted: Fitted, left: Mismatch) -> ScoreTest:
         known = base if is_enough(problem, fitted, left) else None
-        return look_again(
-            problem, fitted, known, inquiry.free(fitted), groups, first_look, inquiry.executor.parallel_map
-        )
+        return rescored(problem, fitted, known, inquiry.free(fitted), groups, first_look, inquiry.executor.parallel_map)
 
     current, left = base, before
     taken = list(begun)
@@ -91,25 +98,25 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
         if (
             not taken
             and not problem.effort.is_ensemble
-            and is_all_by_clocks(problem, base, inquiry.executor.parallel_map)
+            and is_explained_by_clocks(problem, base, inquiry.executor.parallel_map)
         ):
             break
         tried = step(inquiry, current, looked)
         first = first or tried
         if not is_beyond_chance(tried, problem, phases):
             break
-        found = upheld(inquiry, tried, looked)
+        found = validated_step(inquiry, tried, looked)
         if found is None and not taken:
-            found = counted_otherwise(inquiry, current)
+            found = with_other_weighting(inquiry, current)
             first = found or first
         if found is None:
             refuted = not taken
             break
-        found, left = as_conditioned(problem, *followed(inquiry, found), phases)
+        found, left = with_conditions_refitted(problem, *followed(inquiry, found), phases)
         taken.append(found)
         current = found.fitted
         if not problem.heavy_tailed:
-            current = astray(problem, current)
+            current = with_full_weights(problem, current)
             left = mismatch_of(problem.dataset, current.blocks, phases)
         if len(taken) == 2 and not is_enough(problem, current, left):
             # of two that are strong the first may have been taken for something else
@@ -117,10 +124,12 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
             if pairs and not problem.effort.is_ensemble:
                 other, paired = best_subsets(inquiry, taken, first_look, current), True
             elif problem.effort.is_ensemble and current.left - count < TUNING.hopeless_share * (base.left - count):
-                other = with_another_first(inquiry, taken, current)
+                other = with_first_exchanged(inquiry, taken, current)
             if other is not None:
                 (taken, left), current = other, other[0][-1].fitted
-        is_lost = len(taken) > 1 and (is_hopeless(problem, base, current) or is_unlikely(problem, taken[-1], current))
+        is_lost = len(taken) > 1 and (
+            is_hopeless(problem, base, current) or is_third_unlikely(problem, taken[-1], current)
+        )
         if is_lost or is_over_flexible(current.effects):
             break
         looked = beside(current, left)
@@ -147,7 +156,7 @@ def is_hopeless(problem: Problem, base: Fitted, current: Fitted) -> bool:
     return current.left > TUNING.hopeless**2 * count and current.left - count > hardly_any * (base.left - count)
 
 
-def is_unlikely(problem: Problem, last: Step, current: Fitted) -> bool:
+def is_third_unlikely(problem: Problem, last: Step, current: Fitted) -> bool:
     """Whether a third effect, of drops, would have to take far more than the second did for nothing to be left."""
     beyond = current.left - sum(b.residual.size for b in current.blocks)
     return not problem.effort.is_ensemble and beyond > TUNING.no_third_above * max(last.base.left - current.left, 0.0)
@@ -164,26 +173,26 @@ def is_beyond_chance(found: Step | None, problem: Problem, phases: Phases) -> Ty
         TUNING.admitting_p_value_runs if problem.effort.is_ensemble else TUNING.admitting_p_value
     ):
         return False
-    if found.p_value > TUNING.admitting_p_value and not is_missed(found.base, problem, phases):
+    if found.p_value > TUNING.admitting_p_value and not leaves_mismatch(found.base, problem, phases):
         return False
-    moved = moves(problem, found.base, found.fitted)
+    moved = largest_change(problem, found.base, found.fitted)
     if (
         moved >= SETTINGS.inference.adequacy.negligible
         or moved < TUNING.negligible_share * SETTINGS.inference.adequacy.negligible
         or problem.effort.is_ensemble
     ):
         return moved >= SETTINGS.inference.adequacy.negligible
-    if found.base.effects and does(problem, found.fitted) >= SETTINGS.inference.adequacy.negligible:
+    if found.base.effects and size_of_effect(problem, found.fitted) >= SETTINGS.inference.adequacy.negligible:
         return True
-    return is_missed(found.base, problem, phases)
+    return leaves_mismatch(found.base, problem, phases)
 
 
-def is_missed(fitted: Fitted, problem: Problem, phases: Phases) -> bool:
+def leaves_mismatch(fitted: Fitted, problem: Problem, phases: Phases) -> bool:
     """Whether a fit surely leaves something that matters."""
     return not is_enough(problem, fitted, mismatch_of(problem.dataset, fitted.blocks, phases))
 
 
-def upheld(inquiry: Inquiry, found: Step, looked: ScoreTest) -> Step | None:
+def validated_step(inquiry: Inquiry, found: Step, looked: ScoreTest) -> Step | None:
     """A step as it is to be taken; None where runs scatter and its gain does not outlast that."""
     problem = inquiry.problem
     spoken = (
@@ -192,13 +201,13 @@ def upheld(inquiry: Inquiry, found: Step, looked: ScoreTest) -> Step | None:
         else TUNING.admitting_p_value_runs
     )  # what admitted the step speaks for its best
     return (
-        ensemble_validated(problem, backed(found, looked, spoken), inquiry.groups)
+        ensemble_validated(problem, without_unsupported_rivals(found, looked, spoken), inquiry.groups)
         if problem.effort.is_ensemble
         else found
     )
 
 
-def counted_otherwise(inquiry: Inquiry, current: Fitted) -> Step | None:
+def with_other_weighting(inquiry: Inquiry, current: Fitted) -> Step | None:
     """A step with recordings on another course counted in full where they were forgiven, or forgiven; None if none.
 
     Chance could have sent several there, but so could what is missing; and where they went there may hide what shows
@@ -206,27 +215,27 @@ def counted_otherwise(inquiry: Inquiry, current: Fitted) -> Step | None:
     """
     problem = inquiry.problem
     before = problem.heavy_tailed
-    if before and sum(is_other(b.heavy_tail) for b in current.blocks) < TUNING.most_other_courses:
+    if before and sum(took_other_course(b.heavy_tail) for b in current.blocks) < TUNING.most_other_courses:
         return None
     problem.heavy_tailed = not before
     base = problem.again(current)
     looked = look(problem, base, inquiry.candidates, inquiry.groups)
     tried = step(inquiry, base, looked)
-    found = upheld(inquiry, tried, looked) if is_beyond_chance(tried, problem, inquiry.phases) else None
+    found = validated_step(inquiry, tried, looked) if is_beyond_chance(tried, problem, inquiry.phases) else None
     if found is None:
         problem.heavy_tailed = before
     return found
 
 
-def as_conditioned(problem: Problem, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
+def with_conditions_refitted(problem: Problem, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
     """A step and what it leaves; with the errors of the conditions as they act beside it if that leaves chance alone.
 
     Else these stay as they act on the scenario as it is: a wrong effect would bend them too.
     """
-    if is_enough(problem, found.fitted, left) or not is_doubtful(problem):
+    if is_enough(problem, found.fitted, left) or not has_uncertain_conditions(problem):
         return found, left
     before = problem.dataset
-    new = conditioned(problem, found.fitted)
+    new = refitted_with_conditions(problem, found.fitted)
     there = mismatch_of(problem.dataset, new.blocks, phases)
     if is_enough(problem, new, there):
         return found.moved_to(new), there

@@ -22,7 +22,7 @@ from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.noise.truncation import up_to
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.pairs import is_better
-from rollover.diagnosis.selection.stepwise import Taken, one_by_one
+from rollover.diagnosis.selection.stepwise import Taken, forward_selection
 from rollover.diagnosis.settings import SETTINGS
 
 TUNING = SETTINGS.selection.truncated_start
@@ -30,12 +30,12 @@ TUNING = SETTINGS.selection.truncated_start
 ENDS = (1.0 - SETTINGS.data.phases.around_peak, *TUNING.later_ends)
 
 
-def down_first(inquiry: Inquiry, found: Taken) -> Taken:
+def loading_first(inquiry: Inquiry, found: Taken) -> Taken:
     """What was found, or a better one begun with what explains the way down alone; only where much is left."""
     problem, base = inquiry.problem, found.base
     if problem.effort.is_ensemble or found.fitted.left < SETTINGS.selection.stepwise.hopeless**2 * found.count:
         return found
-    if moving_back(inquiry, base) < TUNING.least_share * (found.fitted.left - found.count):
+    if rebound_residual(inquiry, base) < TUNING.least_share * (found.fitted.left - found.count):
         return found  # it came to rest as the simulation does, wherever that was
     steps: Sequence[Step] = ()
     for end in ENDS:
@@ -47,17 +47,17 @@ def down_first(inquiry: Inquiry, found: Taken) -> Taken:
         ):
             break
         steps = above.steps
-    begun, held = _over_all(inquiry, base, steps), problem.dataset
+    begun, held = _extended_to_end(inquiry, base, steps), problem.dataset
     if not begun:
         return found
-    other = one_by_one(inquiry, base, begun)
+    other = forward_selection(inquiry, base, begun)
     if is_better(other.fitted, other.left, found.fitted):
         return other
     problem.with_noise_model(held)
     return found
 
 
-def moving_back(inquiry: Inquiry, base: Fitted) -> float:
+def rebound_residual(inquiry: Inquiry, base: Fitted) -> float:
     """What a fit leaves beyond the noise where both it and the recordings are past the deepest point, about its mean.
 
     Ground that holds what fell into it leaves an offset there, whatever is missing on the way down. Infinite where
@@ -72,7 +72,7 @@ def moving_back(inquiry: Inquiry, base: Fitted) -> float:
         own = float(e.recording.time[int(np.argmax(depth >= TUNING.deepest * depth.max()))])
         rest = TUNING.rest * max(peaks[0] / (1.0 - SETTINGS.data.phases.around_peak), own)
         for signal, part in e.spans():
-            late = block.plain_residual[part][e.recording.time[signal.rows] > rest]
+            late = block.unweighted_residual[part][e.recording.time[signal.rows] > rest]
             if late.size:
                 found, count = found + float(np.sum((late - late.mean()) ** 2)) - late.size, count + late.size
     return found if count else np.inf
@@ -88,7 +88,7 @@ def _until(inquiry: Inquiry, end: float, steps: Sequence[Step]) -> Taken | None:
     align(early)
     no_jacobian, above = early.fit((), ()), replace(inquiry, problem=early)
     found = (
-        one_by_one(above, no_jacobian, _over_all(above, no_jacobian, steps), pairs=False)
+        forward_selection(above, no_jacobian, _extended_to_end(above, no_jacobian, steps), pairs=False)
         if no_jacobian is not None
         else None
     )
@@ -104,7 +104,7 @@ def _cut(e: Dataset, phases: Sequence[tuple[float, str]], end: float) -> Dataset
     return up_to(e, end * peaks[0] / (1.0 - SETTINGS.data.phases.around_peak), TUNING.filter_ahead)
 
 
-def _over_all(inquiry: Inquiry, base: Fitted, steps: Sequence[Step]) -> list[Step]:
+def _extended_to_end(inquiry: Inquiry, base: Fitted, steps: Sequence[Step]) -> list[Step]:
     """The steps with their best and nearest rivals fitted over the whole way, each beside the one before."""
     made: list[Step] = []
     beside = base
