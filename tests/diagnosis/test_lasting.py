@@ -220,16 +220,13 @@ def test_a_rival_that_nothing_spoke_for_is_none() -> None:
     looked = ScoreTest(score=60.0, scores={"slope": 60.0, "mass": 4.0}, null=null, detectable={})
     step = Step(base=fits[0], fitted=fits[1], p_value=0.0, rivals=tuple(fits))
     assert without_unsupported_rivals(step, looked).rivals == (fits[0],)
-    assert without_unsupported_rivals(step, replace(looked, far={"inertia": ((0.9,),)})).rivals == (
-        fits[0],
-        fits[2],
-    )  # its runs did
+    far = replace(looked, far={"inertia": ((0.9,),)})  # its runs did
+    assert without_unsupported_rivals(step, far).rivals == (fits[0], fits[2])
     two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
     placed = [Candidate(id=i, kind="physics", family="f", search=two, neutral=(None, 0.5)) for i in ("slope", "mass")]
     same_family = [Fitted(candidates=(c,), x=(0.5, 0.5), blocks=()) for c in placed]
-    assert without_unsupported_rivals(replace(step, rivals=(*same_family, fits[2])), looked).rivals == tuple(
-        same_family
-    )
+    others = replace(step, rivals=(*same_family, fits[2]))
+    assert without_unsupported_rivals(others, looked).rivals == tuple(same_family)
 
 
 def test_what_shows_before_the_blow_alone_lasts() -> None:
@@ -399,7 +396,7 @@ def test_a_strength_is_judged_as_it_is_held(heavy_tailed: bool, masked: bool, mo
         problem.heavy_tailed = masked
         return fitted
 
-    monkeypatch.setattr(believed, "astray", with_full_weights)
+    monkeypatch.setattr(believed, "with_full_weights", with_full_weights)
     monkeypatch.setattr(believed, "is_there", lambda problem, _: problem.heavy_tailed)
     assert believed.is_significant_as_held(problem, Fitted(candidates=(), x=(), blocks=())) is masked
     assert problem.heavy_tailed is heavy_tailed

@@ -384,11 +384,8 @@ class Problem(Simulations):
             dx = TUNING.lengthen_factor * dx
             there = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
             self.made_ahead((r, candidates, there) for r in use)
-            found = [
-                self._trial_block(r, candidates, there, b.shift)
-                for r, b in zip(use, after, strict=True)
-                if b is not None
-            ]
+            each = zip(use, after, strict=True)
+            found = [self._trial_block(r, candidates, there, b.shift) for r, b in each if b is not None]
             if there == trial or any(b is None for b in found):
                 break
             left = total_of([b for b in found if b is not None])

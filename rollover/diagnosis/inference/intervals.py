@@ -27,6 +27,7 @@ from rollover.effects import EFFECTS, possible, units_of
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.inference.intervals
+ROUNDS = SETTINGS.fit.finite_differences.shift_rounds
 TWO_SIDED = SETTINGS.inference.local_quadratic.normal_quantile
 GENTLE = SETTINGS.fit.linearisation.weak_prior
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
@@ -284,13 +285,7 @@ def _clocked(problem: Problem, fitted: Fitted, way: Array) -> Fitted | None:
     x = [float(v) for v in np.array(fitted.x) + way]
     problem.made_ahead((r, fitted.candidates, x) for r in range(len(fitted.blocks)))
     found = [
-        problem.clocked(
-            r,
-            fitted.candidates,
-            x,
-            there.shift + time_shift_step(there, way),
-            SETTINGS.fit.finite_differences.shift_rounds,
-        )
+        problem.clocked(r, fitted.candidates, x, there.shift + time_shift_step(there, way), ROUNDS)
         for r, there in enumerate(fitted.blocks)
     ]
     blocks = [b for b in found if b is not None]
@@ -317,11 +312,10 @@ def intervals(
     cov = phi A^-1, phi the misfit left per sample (at least 1); beside it, in quadrature, what a gain error of the
     model of `model_error` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
     that nobody could tell apart scatter and samples are weighed by that, cov = phi A^-1 N A^-1 with N the covariance
-    that the noise alone gives J'w; beside it stand `ensemble_variance` and `shape_variance`. Elsewhere shapes that were
-    not fitted are in A, see `with_secondary`; an end of a range is read off where samples pile up there. How far the
-    misfit stays low is told by `quadratic_extents` where runs scatter, and by `profile_extents` elsewhere and where that
-    does not tell; with `sides` by `profile_extents` alone, and all others are as wide as slopes say. `coarse` is the fit that
-    was moved to this one `refined_by_ensemble_mean`: steps of no length would move it by another 1/(PARTS - 1) of that.
+    that the noise alone gives J'w; beside it stand `ensemble_variance` and `shape_variance`. Elsewhere unfitted shapes
+    are in A (`with_secondary`); an end of a range is read off where samples pile up. How far the misfit stays low is
+    found by `quadratic_extents` where runs scatter, else by `profile_extents`; with `sides` by the latter alone, others
+    as wide as slopes say. `coarse` is the fit that `refined_by_ensemble_mean` moved to this one.
     """
     told, coarse = fitted, coarse or fitted
     fitted, prior, kept = with_secondary(problem, fitted)
