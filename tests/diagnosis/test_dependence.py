@@ -133,7 +133,7 @@ def test_loading_starts_at_onset_where_shifts_absorbed_it(
 
     assert all(abs(d.shift) < 1.5e-3 for d in loading_paths(problem, scenarios, base)[1])
     assert worst() < 0.3  # of what noise leaves, beyond it
-    monkeypatch.setattr(dependence_of, "by_first_contact", lambda *_: [None] * len(made))
+    monkeypatch.setattr(dependence_of, "shifts_from_contact", lambda *_: [None] * len(made))
     assert worst() > 3.0
 
 

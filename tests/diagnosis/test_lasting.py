@@ -297,7 +297,7 @@ def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyP
     assert found is not None
     assert [f.candidates[-1].key for f in found.rivals] == ["slope"]
     monkeypatch.setattr(believed, "is_shared", lambda *_: False)
-    monkeypatch.setattr(believed, "before_the_impact", lambda _, s: replace(s, fitted=s.base))
+    monkeypatch.setattr(believed, "judged_before_impact", lambda _, s: replace(s, fitted=s.base))
     problem.with_noise_model(every)
     step = Step(base=base, fitted=lucky, p_value=0.0, rivals=(lucky, right))
     assert ensemble_validated(problem, step, [[k] for k in range(4)]) is None
@@ -375,10 +375,9 @@ def test_other_courses_are_counted_otherwise_where_nothing_lasts(
     monkeypatch.setattr(stepwise, "look", parallel_map)
     monkeypatch.setattr(stepwise, "step", lambda *_: made)
     monkeypatch.setattr(stepwise, "ensemble_validated", lambda *_: made if lasts else None)
-    monkeypatch.setattr(stepwise, "moves", lambda *_: 1.0)
-    inquiry = Inquiry(
-        problem=problem, candidates=[], groups=[], phases=[], say=lambda _: None, executor=cast(Any, None)
-    )
+    monkeypatch.setattr(stepwise, "largest_change", lambda *_: 1.0)
+    none: Any = None
+    inquiry = Inquiry(problem=problem, candidates=[], groups=[], phases=[], say=print, executor=none)
     found = stepwise.with_other_weighting(inquiry, current)
     able = others > 1 or not heavy_tailed
     assert seen == [not heavy_tailed] * able

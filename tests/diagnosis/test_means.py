@@ -69,7 +69,7 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         made.append(onward(problem, old, dx))
         return made[-1]
 
-    monkeypatch.setattr(ensemble_mean, "_onward", counted)
+    monkeypatch.setattr(ensemble_mean, "_line_search", counted)
     return made
 
 
@@ -117,7 +117,7 @@ def test_a_full_step_is_taken_unless_a_part_is_clearly_better(
         asked.append(round(x[0], 9))
         return lefts[len(asked) - 1], [s + 1.0 for s in shifts]
 
-    monkeypatch.setattr(ensemble_mean, "_met", met)
+    monkeypatch.setattr(ensemble_mean, "_misfit_and_shifts", met)
     problem: Any = SimpleNamespace(made_ahead=lambda points: announced.extend(round(x[0], 9) for _, _, x in points))
     block = ResidualBlock(residual=np.full(4, 5.0), J=np.zeros((4, 1)), slope=np.zeros(4), shift=0.0, prior=1.0)
     old = Fitted(candidates=(SLOPE,), x=(0.5,), blocks=(block,))
