@@ -376,8 +376,7 @@ def test_other_courses_are_counted_otherwise_where_nothing_lasts(
     monkeypatch.setattr(stepwise, "step", lambda *_: made)
     monkeypatch.setattr(stepwise, "ensemble_validated", lambda *_: made if lasts else None)
     monkeypatch.setattr(stepwise, "largest_change", lambda *_: 1.0)
-    none: Any = None
-    inquiry = Inquiry(problem=problem, candidates=[], groups=[], phases=[], say=print, executor=none)
+    inquiry = Inquiry(problem=problem, candidates=[], groups=[], phases=[], say=print, executor=cast(Any, None))
     found = stepwise.with_other_weighting(inquiry, current)
     able = others > 1 or not heavy_tailed
     assert seen == [not heavy_tailed] * able

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rollover.assessment.ledger import LIMIT, closure
-from rollover.dynamics import simulate
+from rollover.dynamics import recorder
 from rollover.dynamics.result import Run
 from rollover.dynamics.simulate import run
 from rollover.kernels.step import end_of_step
@@ -230,6 +230,6 @@ def test_a_step_that_the_solver_halves_is_booked_as_it_was_taken(monkeypatch: py
         shortest.append(h)
         end_of_step(t, q, qd, qdd, h, Q)
 
-    monkeypatch.setattr(simulate, "end_of_step", watched)
+    monkeypatch.setattr(recorder, "end_of_step", watched)
     assert closure(run(scenario)).largest < 0.2 * LIMIT
     assert min(shortest[1:]) < 0.0008  # otherwise this shows nothing
