@@ -170,7 +170,7 @@ def test_what_draws_any_curve_is_not_followed_but_straightened(
     monkeypatch.setattr(simplification, "mismatch_of", lambda *_: SimpleNamespace(p_value=1e-9))
     monkeypatch.setattr(simplification, "is_over_flexible", lambda _: is_a_curve)
     monkeypatch.setattr(simplification, "with_thresholds_traced", lambda _, f: traced.append(f) or f)
-    for name in ("timed", "polish", "ended"):
+    for name in ("with_time_shift_search", "polish", "ended"):
         monkeypatch.setattr(simplification, name, lambda _, f: f)
     monkeypatch.setattr(simplification, "simpler", lambda *_: None)
     straight = step(fitted("soil-stiffness", 4.0, (0.7, 0.3)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from rollover.spec.document import shipped_folder
 
 SCENARIOS = sorted(p.stem for p in shipped_folder().glob("*.yaml"))
 FORMATS = ("csv", "xlsx", "mme.zip", "mat")
-SIXTEEN_DIGITS = 5e-16  # half a unit of the sixteenth digit of 1.0, what a workbook's numbers are rounded to
+SIXTEEN_DIGITS = 5e-16 + 2.0**-53  # half a unit of the sixteenth digit of 1.0, as a workbook rounds, and of a double
 EVEN = 1e-12  # s; an ISO-MME file states even stamps by their first and their step
 
 
@@ -223,7 +224,16 @@ def test_what_cannot_be_exported_is_one_line(
 
 
 def test_what_has_no_place_in_iso_mme_is_said(tmp_path: Path) -> None:
-    write_parquet(odd(), tmp_path / "channels.parquet")
+    named = {name: values for name, values in odd().channels.items() if not name.startswith("sensor/")}
+    write_parquet(replace(odd(), channels=named, sensors={}), tmp_path / "channels.parquet")
     status, _, said = export(tmp_path, "--to", "mme.zip", "--out", tmp_path / "a.mme.zip")
     assert status == 0
-    assert "without its conditions, uncertainty, noise, sensors, for which an ISO-MME test has no place" in said
+    assert "without its conditions, uncertainty, noise, for which an ISO-MME test has no place" in said
+
+
+def test_a_placed_instrument_is_no_channel_of_iso_mme(tmp_path: Path) -> None:
+    write_parquet(odd(), tmp_path / "channels.parquet")
+    status, _, said = export(tmp_path, "--to", "mme.zip", "--out", tmp_path / "a.mme.zip")
+    assert (status, said.count("\n")) == (2, 1), said
+    assert "where an instrument sits, got sensor/a-b/acceleration_x" in said
+    assert sorted(os.listdir(tmp_path)) == ["channels.parquet"]

@@ -12,7 +12,7 @@ from rollover.cli.commands.recordings_out import check_format, written
 from rollover.system.errors import Fault, InputError
 
 FORMATS = ("csv", "xlsx", "mme.zip", "mat")
-NO_ROOM = ("conditions", "uncertainty", "noise", "sensors")  # in an ISO-MME test as it is written here
+NO_ROOM = ("conditions", "uncertainty", "noise")  # in an ISO-MME test as it is written here
 
 
 @app.command(
@@ -57,7 +57,7 @@ def export(
     read = read_curves(result) if result.is_dir() else {}
     read = read or read_named([result])
     made = {n: (at, with_channels(r, channel or ("*",), str(result))) for n, (at, r) in read.items()}
-    if to == "mme.zip" and (lost := [k for k in NO_ROOM if any(getattr(r, k) for _, r in made.values())]):
-        console.say(f"{result}: without its {', '.join(lost)}, for which an ISO-MME test has no place")
     place = out or Path("out", "export", name)
     written(made, place, to, source=str(result), force=force, as_json=as_json, with_units=True)
+    if to == "mme.zip" and (lost := [k for k in NO_ROOM if any(getattr(r, k) for _, r in made.values())]):
+        console.say(f"{result}: without its {', '.join(lost)}, for which an ISO-MME test has no place")
