@@ -142,7 +142,8 @@ def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest
         return SimpleNamespace(id=id, key=id, kind="parameter", channel=None)
 
     def fit(*ids: str) -> Any:
-        return SimpleNamespace(candidates=tuple(one(i) for i in ids))
+        effects = tuple(one(i) for i in ids)
+        return SimpleNamespace(candidates=effects, effects=effects)
 
     both = fit("soil-stiffness", "inertia")
     told = [{"scale": SimpleNamespace(value=1.2)}, {"scale": SimpleNamespace(value=0.9)}]
