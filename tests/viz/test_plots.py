@@ -102,7 +102,7 @@ def test_extremes_of_both_coordinates_and_gaps_survive_thinning() -> None:
     x, y = draw.normal(size=50_000), draw.normal(size=50_000)
     y[20_000:20_400] = np.nan
     a, b = thinned(x, y)
-    assert len(a) <= plots.MOST_POINTS + 402
+    assert len(a) <= MOST_POINTS + 402
     good = np.isfinite(y)
     assert (a.min(), a.max()) == (x[good].min(), x[good].max())
     assert (np.nanmin(b), np.nanmax(b)) == (np.nanmin(y), np.nanmax(y))
