@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from viz.figures import plots
 from viz.figures.plots import COLOURS, Curve, Level, Outline, View, thinned
+from viz.figures.reading import MOST_POINTS
 from viz.figures.svg import number_label
 
 Array = NDArray[np.float64]
