@@ -51,8 +51,8 @@ EQUAL = 1e-6  # of the largest value of a channel, or of its vector, before the 
 # m/s2: Exudyn finds a turn of x by arccos, to 4 eps/x, here 4e-12 rad for the 1e-4 rad by which a vehicle that stands
 # leans; that on an arm of 1 m over beta h^2 is what the pivot's equations make of it at 1 ms
 ACCELERATION = 1e-5
-# where tyres carry a platform's shaking Newton stops at 1e-5 of the first residual, and rounding decides at which of two
-# iterations: so far accelerations, and what is carried with them, may differ, of their largest value
+# on a platform that shakes Newton stops at 1e-5 of the first residual, and rounding decides after which iteration: so
+# far accelerations, and what is carried with them, may differ, of their largest value
 ITERATED = {"shaken_platform": 5e-5}
 # rad/s: that turn of 4e-12 rad in a rate, times gamma/(beta h) = 2/h
 RATE = 1e-8

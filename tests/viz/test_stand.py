@@ -66,13 +66,20 @@ STANDS = {
 }
 
 
+REQUIRED = {  # what a page answers first where a standard asks for something
+    "static_rops_test": "1 of 6 requirements are met; least clearance ",
+    "pendulum": "All 3 requirements are met; least clearance ",
+}
+
+
 @pytest.mark.parametrize("name", STANDS)
 def test_a_stand_is_told_by_what_it_found(name: str) -> None:
     """On the page and in the picture: its own load first, its sentence and table, nothing of loads that never were."""
     result, (first, sentence) = made(name), STANDS[name]
     peaks, rows = peak_loads(result), criteria(result)
     head = headline(result, peaks, rows)
-    assert head.sentence.startswith(first)
+    assert head.sentence.startswith(REQUIRED.get(name, first))
+    assert first in f"{head.sentence} {head.detail}"
     text = page(result, peaks, ANSWER, rows=rows)
     said = Parts(text).said
     assert sentence in said
