@@ -6,7 +6,7 @@
   for (const svg of document.querySelectorAll("figure svg[data-axes]")) {
     const axes = JSON.parse(svg.dataset.axes), whole = svg.getAttribute("viewBox").split(" ").map(Number);
     const says = document.createElement("p"), band = document.createElementNS(svg.namespaceURI, "rect");
-    says.className = "where reading";
+    says.className = "reading";
     says.textContent = hint;
     svg.after(says);
     band.setAttribute("class", "band");
