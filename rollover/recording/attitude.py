@@ -71,10 +71,14 @@ def continuous(recording: Recording) -> Recording:
 
 
 def _without_means(recording: Recording) -> Recording:
-    """The recording with gaps for samples that are means over a wrap."""
+    """The recording with gaps for samples that are means over a wrap; one on the other branch is none."""
     channels, notes = dict(recording.channels), list(recording.notes)
+    rpy = _columns(recording, ANGLES)
+    turned = np.nanmax(np.abs(wrapped(one_branch(rpy) - rpy)), axis=1, initial=0.0) > SAME
+    to_another = turned[1:] != turned[:-1]
+    crossing = np.concatenate([[False], to_another]) | np.concatenate([to_another, [False]])
     for name in sorted(PERIODIC.intersection(channels)):
-        means = across_wraps(channels[name])
+        means = across_wraps(channels[name]) & ~(crossing if name in ANGLES else False)
         if count := int(means.sum()):
             channels[name] = np.where(means, np.nan, channels[name])
             first = float(recording.time[np.argmax(means)])

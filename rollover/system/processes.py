@@ -15,13 +15,15 @@ import threading
 import traceback
 import types
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, Generic, Literal, TypeVar
+
+from rollover.system import own_code
 
 C = TypeVar("C")
 V = TypeVar("V")
@@ -123,8 +125,10 @@ def child_pool(workers: int, warm_up: Callable[[], None] | None = None, bare: bo
     from pebble import ProcessPool
 
     context = _Bare(_context()) if bare else _context()
+    # a server that began earlier has the environment of then, without the files of one's own that were named since
+    named = {name: os.environ[name] for name in own_code.KINDS.values() if name in os.environ}
     return ProcessPool(
-        max_workers=workers, max_tasks=TASKS, context=context, initializer=_begin_child, initargs=(warm_up,)
+        max_workers=workers, max_tasks=TASKS, context=context, initializer=_begin_child, initargs=(warm_up, named)
     )
 
 
@@ -183,7 +187,8 @@ class _Bare:
         return process
 
 
-def _begin_child(warm_up: Callable[[], None] | None) -> None:
+def _begin_child(warm_up: Callable[[], None] | None, named: Mapping[str, str]) -> None:
+    os.environ.update(named)
     for name in THREADS:
         os.environ.setdefault(name, "1")
     threading.Thread(target=_leave_with_parent, daemon=True).start()

@@ -251,7 +251,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (lambda d: ro.calibrate("drop_test", d, FIT, hold_out="d7"), "hold_out: no such recording, got 'd7'"),
         (lambda d: ro.calibrate("drop_test", d, FIT, clock_sigma=float("nan")), "clock_sigma: out of bounds, got nan"),
         (lambda d: ro.identify(d, law="baring"), "law: unknown, got 'baring'"),
-        (lambda d: ro.identify(d, buoyancy=-1.0), "buoyancy: out of bounds, got -1.0; at least 0 is allowed"),
+        (lambda d: ro.identify(d, buoyancy=-1.0), "buoyancy: out of bounds, got -1.0; 0 to 1e+06 is allowed"),
         (
             lambda d: ro.diagnose("drop_test", d, tolerance=0.6),
             "tolerance: out of bounds, got 0.6; 0 to 0.5 is allowed",

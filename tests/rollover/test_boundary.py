@@ -7,6 +7,7 @@ import random
 import struct
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,8 @@ import numpy as np
 import pytest
 
 from rollover.comparison.run_pair import read as result
-from rollover.recording import read_parquet
-from rollover.recording.importers import COLLECTIONS, importers, read_recording
+from rollover.recording import Recording, read_parquet
+from rollover.recording.importers import COLLECTIONS, importers, read_recording, write_recording
 from rollover.recording.importers.importer import Collection, Importer
 from rollover.system import boundary
 from rollover.system.errors import Fault, InputError, has_cure
@@ -28,6 +29,17 @@ for library in ("nptdms", "asammdf", "h5py", "mcap", "idelib", "openpyxl"):
     needs(library)
 
 Files = dict[str, bytes]
+
+
+def workbook() -> bytes:
+    """A drop as `rollover export` writes it."""
+    with tempfile.TemporaryDirectory() as folder:
+        columns = {"ground/sinkage": np.sin(seeds.TIME), "ground/force_normal": np.cos(seeds.TIME)}
+        drop = Recording(title="a drop", time=seeds.TIME, channels=columns)
+        write_recording(drop, path := Path(folder, "a.xlsx"))
+        return path.read_bytes()
+
+
 # what each reader reads: the file that is handed over, and all that stands beside it
 VALID: dict[str, tuple[str, Callable[[], Files]]] = {
     "plain": ("a.csv", lambda: {"a.csv": seeds.csv(seeds.drop_columns()), "a.yaml": seeds.SIDE.encode()}),
@@ -35,6 +47,7 @@ VALID: dict[str, tuple[str, Callable[[], Files]]] = {
     "nhtsa": ("v00001", lambda: {f"v00001/{k}": v for k, v in texts.nhtsa().items()}),
     "iso-mme": ("a.zip", lambda: {"a.zip": texts.zipped(texts.mme_members())}),
     "mat": ("a.mat", lambda: {"a.mat": seeds.mat()}),
+    "xlsx": ("a.xlsx", lambda: {"a.xlsx": workbook()}),
     "tdms": ("a.tdms", lambda: {"a.tdms": seeds.tdms()}),
     "mdf": ("a.mf4", lambda: {"a.mf4": seeds.mdf()}),
     "hdf5": ("a.h5", lambda: {"a.h5": seeds.hdf5()}),

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from rollover.system import processes
+from rollover.system import own_code, processes
 from rollover.system.processes import map_cases
 
 
@@ -168,6 +168,14 @@ def test_a_pool_whose_idle_child_is_ended_is_replaced(monkeypatch: pytest.Monkey
     found = {o.index: o.value[0] for o in map_cases(odd, slowly(), workers=1) if o.value}
     assert found == {0: 4, 1: 9}
     assert len(made) == 2
+
+
+def test_children_find_a_file_named_after_their_server_began(monkeypatch: pytest.MonkeyPatch) -> None:
+    variable = own_code.KINDS["models"]
+    monkeypatch.delenv(variable, raising=False)
+    assert [o.value for o in map_cases(os.getenv, [variable], workers=1)] == [None]
+    monkeypatch.setenv(variable, "/mine.py")
+    assert [o.value for o in map_cases(os.getenv, [variable], workers=1)] == ["/mine.py"]
 
 
 def test_without_workers_in_this_process() -> None:
