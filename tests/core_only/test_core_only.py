@@ -35,6 +35,7 @@ COMMANDS = {
     "slurm": ["study", "s.yaml", "--scheduler", "slurm"],
     "reliability": ["study", "reliability.yaml"],
     "xlsx": ["import", "balls", "--as", "falling-balls"],
+    "posterior": ["calibrate", "drop_test", "d.csv", "--fit", "vehicle.mass", "--posterior"],
 }
 CSV = "t,F\n" + "".join(f"{k * 1e-3},{(k * k) % 7 * 1e-2}\n" for k in range(200))
 SIDECAR = """format: rollover-recording/1
@@ -72,6 +73,8 @@ def test_a_command_that_needs_an_extra_is_refused_by_its_name(extra: str, tmp_pa
     (tmp_path / "balls").mkdir()
     (tmp_path / "balls" / "Ball_drops_data.xls").write_bytes(b"PK\x03\x04" + bytes(64))
     (tmp_path / "balls" / "balls.txt").write_text("ball,mass,circumference\n")
+    (tmp_path / "d.csv").write_text(CSV)
+    (tmp_path / "d.yaml").write_text(SIDECAR)
     done = rollover(*COMMANDS[extra], cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     (line,) = done.stderr.strip().splitlines()
