@@ -145,7 +145,7 @@ class _Independent:
         return np.asarray(-0.5 * (FREEDOM + p) * np.log1p(np.sum(z**2, axis=1) / FREEDOM))
 
     def proposed(self, places: Array, random: Any) -> tuple[Array, Array]:
-        """New places, and what the odds of coming back are over those of going there, as a logarithm."""
+        """New places, and the logarithm of the proposal's density back over that there (Hastings' ratio)."""
         new = self.drawn(len(places), random)
         return new, self.log_density(places) - self.log_density(new)
 

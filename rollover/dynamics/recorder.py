@@ -43,7 +43,7 @@ class Live:
 
 
 def watch_of(scenario: Scenario, t: Tables, steps: int, start: float) -> loop.Watch:
-    """Room for the rows of a run, and what its loop is told by."""
+    """Room for the rows of a run, and what its loop needs to know."""
     h = scenario.simulation.step
     every = max(1, round(scenario.simulation.output_step / h))
     uncalibrated, deepest = told_by_laws(scenario.ground.every_law)

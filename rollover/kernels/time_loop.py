@@ -42,7 +42,7 @@ ROWS, PER_FRAME, TOUCHED, RESTED, COUNTED = 0, 1, 2, 3, 4
 
 
 class Watch(NamedTuple):
-    """What is kept of a run, and what it is told by."""
+    """What is kept of a run, and what the loop needs to know."""
 
     rows: Any  # (rows, row_length)
     time: Any  # (rows,) of the loop, s

@@ -134,6 +134,7 @@ def test_less_noise_and_more_drops_distinguish_more() -> None:
     assert PlannedTests(drops(2.0, noise=0.01)).unexplained(c, usual) < 0.3 * plain
     assert PlannedTests(drops(2.0)).unexplained(c, strong) == pytest.approx(4.0 * plain, rel=0.1)
     assert PlannedTests(drops(2.0, 3.0)).unexplained(c, usual) > 1.5 * plain
+    # four times the samples of white noise; at the low rate a jump within one sample hides some of them
     assert PlannedTests(drops(2.0, rate=1200.0)).unexplained(c, usual) == pytest.approx(4.0 * plain, rel=0.25)
     assert PlannedTests(drops(2.0, tolerance=0.02)).unexplained(c, usual) < 0.2 * plain
     some = [only(e, [DEPTH]) for e in drops(2.0)]

@@ -48,6 +48,7 @@ def test_a_bend_is_named_and_fitted_beside_the_line() -> None:
     assert [e.id for e in found.effects] == ["bend"]
     best, error = least_squares(recordings, (1, 0, 2))
     told = found.effects[0].parameters["coefficient"]
+    # both weigh the same samples, by a noise that is estimated: a fifth of the standard error
     assert told.value == pytest.approx(best[2], abs=0.2 * error[2])
     assert told.low < 0.05 < told.high
     assert found.baseline["level"].value == pytest.approx(best[1], abs=0.2 * error[1])

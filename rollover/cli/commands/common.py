@@ -191,20 +191,26 @@ def settings(given: list[str], option: str = "--set") -> dict[str, Any]:
     return settings
 
 
+def number_by_channel(text: str) -> tuple[str | None, float]:
+    """Channel, None for all of them, and number of `NUMBER` or `CHANNEL=NUMBER`; NaN for what is no number."""
+    channel, equals, number = text.rpartition("=")
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.nan
+    return channel if equals else None, value
+
+
 def noises(given: list[str]) -> tuple[float, dict[str, float]]:
     """Share of the range for all, and 1 sigma for some channels. Raises `InputError`."""
     share, sigmas = 0.005, {}
     for text in given:
-        channel, equals, number = text.rpartition("=")
-        try:
-            value = float(number)
-        except ValueError:
-            value = -1.0
+        channel, value = number_by_channel(text)
         if not 0.0 <= value < float("inf"):
             message = f"not a noise, got {text!r}; SHARE or CHANNEL=SIGMA, at least 0"
             raise InputError(Fault(file="--noise", message=message))
-        if equals:
-            sigmas[channel] = value
-        else:
+        if channel is None:
             share = value
+        else:
+            sigmas[channel] = value
     return share, sigmas

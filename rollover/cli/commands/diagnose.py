@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.cli.commands.common import AsJson, Force, Setting, answering, app, manual, settings
+from rollover.cli.commands.common import AsJson, Force, Setting, answering, app, manual, number_by_channel, settings
 from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -276,21 +276,18 @@ def tolerances(given: Sequence[str], measured: Mapping[str, Recording]) -> float
     found: dict[str, float] = {}
     general = 0.0
     for text in given:
-        channel, is_by_channel, number = text.rpartition("=")
-        try:
-            share = float(number)
-        except ValueError:
-            share = -1.0
+        channel, share = number_by_channel(text)
         if not 0.0 <= share <= MOST_TOLERATED:
+            number = text.rpartition("=")[2]
             message = f"not a share of a range, got {number!r}; a number from 0 to {MOST_TOLERATED:g}, or CHANNEL=SHARE"
             raise InputError(Fault(file="--tolerance", message=message))
-        if is_by_channel and channel not in channels:
+        if channel is None:
+            general = share
+            continue
+        if channel not in channels:
             message = f"no such channel in the recordings, got {channel!r}; {hint(channel, channels)}"
             raise InputError(Fault(file="--tolerance", message=message))
-        if is_by_channel:
-            found[channel] = share
-        else:
-            general = share
+        found[channel] = share
     return {channel: found.get(channel, general) for channel in channels} if found else general
 
 
