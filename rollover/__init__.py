@@ -377,7 +377,9 @@ def study(
     one_of("retry", retry, ("", "failed"))
     ready = prepared(studies.find(study), None if out is None else Path(out), force=force)
     way = Way(workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry)
-    account = ready.carried_out(way, page=lambda done, told: page(ready.study, done, told, command="rollover.study()"))
+    account = ready.carried_out(
+        way, page=lambda done, table: page(ready.study, done, table, command="rollover.study()")
+    )
     return {str(key): value for key, value in plain(account).items()}
 
 

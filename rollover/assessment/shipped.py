@@ -39,9 +39,9 @@ class Origin:
         """One line; empty where nothing differs."""
         if not self.differences:
             return ""
-        told = [f"{d.path}: {d.shipped} -> {d.now}" for d in self.differences[:MOST_IN_WORDS]]
-        more = len(self.differences) - len(told)
-        return f"Differs from the shipped {self.name}: " + "; ".join(told) + (f"; {more} more" if more else "")
+        changes = [f"{d.path}: {d.shipped} -> {d.now}" for d in self.differences[:MOST_IN_WORDS]]
+        more = len(self.differences) - len(changes)
+        return f"Differs from the shipped {self.name}: " + "; ".join(changes) + (f"; {more} more" if more else "")
 
 
 def origin(scenario: Scenario) -> Origin | None:

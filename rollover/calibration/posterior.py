@@ -108,8 +108,8 @@ def sampled(
     chains.run_mcmc(start, warm_up + steps, skip_initial_state_check=True)
     kept = np.asarray(chains.get_chain(discard=warm_up))  # (steps, walkers, p)
     with np.errstate(invalid="ignore"):  # of a walker that never moved
-        told = emcee.autocorr.integrated_time(kept, tol=0)  # what is too short for it shows in R-hat
-    worth = np.where(np.isfinite(told), np.clip(told, 1.0, steps), steps)
+        autocorrelation_time = emcee.autocorr.integrated_time(kept, tol=0)  # what is too short for it shows in R-hat
+    worth = np.where(np.isfinite(autocorrelation_time), np.clip(autocorrelation_time, 1.0, steps), steps)
     return Posterior(
         draws=kept.reshape(-1, centre.size)[:draws],
         r_hat=r_hat(kept),

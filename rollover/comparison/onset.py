@@ -29,7 +29,7 @@ from rollover.comparison.registration import behind, laid_over, parts
 from rollover.dynamics.drop_test import BESIDE, DropFailedError, DropModel, landing_speed, simulate_drop, unfit
 from rollover.recording import Clock, Recording
 from rollover.recording.noise_floor import LENGTH, noise_floor
-from rollover.recording.time_stamps import Told, Zero, from_first, rounding
+from rollover.recording.time_stamps import Method, Zero, from_first, rounding
 from rollover.scenario import Scenario
 from rollover.spec.channels import describe
 from rollover.spec.initiation import Drop, Release
@@ -38,7 +38,7 @@ from rollover.system.errors import Fault, InputError
 
 Array = NDArray[np.float64]
 Simulate = Callable[[Scenario], Recording]
-Found = tuple[float, float, Told, tuple[str, ...]]
+Found = tuple[float, float, Method, tuple[str, ...]]
 
 KNOWN = 1e-3  # s, 1 sigma of a zero that is said to be known
 SURE = 5.0  # sigmas, beyond which a zero is not where it is said to be
@@ -164,20 +164,20 @@ def by_onset(
         return None
     # of two that disagree the earlier one: an instrument is late, never early
     about = sorted(onset for onset, _ in seen.values())[(len(seen) - 1) // 2]
-    told = []
+    notes = []
     for channel, (at, since) in seen.items():
         if abs(at - about) <= SOON + LEAST * _step(recording, channel):
-            told.append((channel, _refined(recording, channel, run, contact, at, since)))
-    weight = np.array([s**-2 for _, (_, s) in told])
-    each = np.array([m for _, (m, _) in told])
+            notes.append((channel, _refined(recording, channel, run, contact, at, since)))
+    weight = np.array([s**-2 for _, (_, s) in notes])
+    each = np.array([m for _, (m, _) in notes])
     mean = float(weight @ each / weight.sum())
     # channels that differ by more than they should widen it (Birge's ratio)
-    apart = float(weight @ (each - mean) ** 2 / max(len(told) - 1, 1))
+    apart = float(weight @ (each - mean) ** 2 / max(len(notes) - 1, 1))
     sigma = float(np.sqrt(max(apart, 1.0) / weight.sum()))
     if prior is not None:
         both = sigma**-2 + prior[1] ** -2
         mean, sigma = float((mean * sigma**-2 + prior[0] * prior[1] ** -2) / both), float(both**-0.5)
-    return mean, sigma, "onset", tuple(c for c, _ in told)
+    return mean, sigma, "onset", tuple(c for c, _ in notes)
 
 
 def by_alignment(recording: Recording, scenario: Scenario, simulate: Simulate) -> Found | None:

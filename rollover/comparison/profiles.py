@@ -21,8 +21,8 @@ def profile_of(path: Path | None) -> Described | None:
     given = read_profile(path)
     if given.by_file is None:
         return given
-    told = {name: _unknown(name) for name in given.by_file.places}
-    faults = [replace(given.by_file.places[name], message=what) for name, what in told.items() if what]
+    unread = {name: _unknown(name) for name in given.by_file.places}
+    faults = [replace(given.by_file.places[name], message=what) for name, what in unread.items() if what]
     if faults:
         raise InputError(*faults)
     return given

@@ -92,8 +92,8 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
         becomes_best = len(rival.x) > len(best.x) and ends_at_bound(rival)
         if becomes_best or any(rival is f for f in near):
             continue
-        is_akin = is_tolerated(problem, rival) or rival.candidates[-1].family == best.candidates[-1].family
-        if is_akin and start - float(held_out(rival, groups).left.sum()) >= least:
+        is_as_near = is_tolerated(problem, rival) or rival.candidates[-1].family == best.candidates[-1].family
+        if is_as_near and start - float(held_out(rival, groups).left.sum()) >= least:
             near.append(rival)
     return near
 

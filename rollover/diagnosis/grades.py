@@ -81,7 +81,7 @@ def with_shares(
     whole, each = shares(problem, found, groups)
     # where a run is dear, what was simulated without an effect stands for the others as they are
     bases = {s.fitted.candidates[-1].key: s.base for s in found.parts} if problem.effort.is_ensemble else {}
-    told = []
+    with_grades = []
     for k, (c, own) in enumerate(with_slices(found.fitted.candidates)):
         others = [o for j, o in enumerate(found.fitted.candidates) if j != k]
         x = [v for j, v in enumerate(found.fitted.x) if not own.start <= j < own.stop]
@@ -89,9 +89,9 @@ def with_shares(
             others, x = list(bases[c.key].candidates), list(bases[c.key].x)
         named = [e for e in effects if (e.id, e.channel) == (c.id, c.channel)]
         moves = moved(problem, found.fitted, others, x) if c.kind != "sensor" and named else None
-        told += [replace(e, explains=each.get(c.key), moves=moves) for e in named]
+        with_grades += [replace(e, explains=each.get(c.key), moves=moves) for e in named]
     place = {(e.id, e.channel): n for n, e in enumerate(effects)}
-    return tuple(sorted(told, key=lambda e: place[e.id, e.channel])), whole
+    return tuple(sorted(with_grades, key=lambda e: place[e.id, e.channel])), whole
 
 
 def moved(problem: Problem, fitted: Fitted, others: Sequence[Candidate], x: Sequence[float]) -> float | None:

@@ -51,7 +51,7 @@ def rejected_effects(problem: Problem, found: Explanation, effects: Sequence[Nam
 
 def may_be_null(effect: Named) -> bool:
     """Whether its interval holds its null; what does something at its least strength already is there all the same."""
-    return is_null_effect(effect) and not EFFECTS[effect.id].is_sudden
+    return is_null_effect(effect) and not EFFECTS[effect.id].is_discontinuous
 
 
 def holds_null(effect: Named) -> bool:
@@ -109,10 +109,10 @@ def clear_of_null(problem: Problem, found: Explanation, effects: Sequence[Named]
     """Effects, one alone with an interval that ends before its null where it would hold that by slopes."""
     if len(effects) != 1 or problem.effort.is_ensemble or not may_be_null(effects[0]):
         return tuple(effects)
-    told = null_side(problem, found.fitted)
-    if told is None:
+    side = null_side(problem, found.fitted)
+    if side is None:
         return tuple(effects)
-    name, end, is_low = told
+    name, end, is_low = side
     own = effects[0].parameters[name]
     own = replace(own, low=end) if is_low else replace(own, high=end)
     return (replace(effects[0], parameters={**effects[0].parameters, name: own}),)
@@ -163,7 +163,7 @@ def checked(found: Diagnosis) -> Diagnosis:
     rules = {
         "no value at a bound is a finding": not at_bounds(found.effects),
         "no interval of a finding holds its null": not any(
-            holds_null(e) and not EFFECTS[e.id].is_sudden for e in found.effects
+            holds_null(e) and not EFFECTS[e.id].is_discontinuous for e in found.effects
         ),
         "held-out recordings are predicted no worse than without": gains,
         "verdict and effects agree": (found.verdict in NAMING) == bool(found.effects),

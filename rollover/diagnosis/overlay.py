@@ -73,7 +73,7 @@ class Track:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Told:
+class Overlay:
     """One recording: its tracks, its phases (start s, name), and the time shift (s) at which it is shown."""
 
     recording: str
@@ -90,21 +90,21 @@ def series(
     recordings: Sequence[tuple[str, Recording]],
     found: Diagnosis,
     children: Children | None = None,
-) -> tuple[Told, ...]:
+) -> tuple[Overlay, ...]:
     """Each recording beside its simulations, in the order given; those that could not be simulated are left out.
 
     `children` make full runs side by side.
     """
     diagnosed = diagnosed_scenario(scenario, found)
     judged = found.held_out if set(found.held_out) != set(found.training) else ()
-    told = []
+    overlays = []
     for name, recording in zeros_from_contact(scenario, recordings)[0]:
         laid = {CENTRE: found.grids[name]} if name in found.grids else {}
         other = diagnosed.replaced(laid) if found.effects or found.empirical else None
         one = _told(name, recording, scenario.replaced(laid), other, name in judged, children)
         if one is not None:
-            told.append(one)
-    return tuple(told)
+            overlays.append(one)
+    return tuple(overlays)
 
 
 def _told(
@@ -114,7 +114,7 @@ def _told(
     diagnosed: Scenario | None,
     held_out: bool,
     children: Children | None,
-) -> Told | None:
+) -> Overlay | None:
     recording, reference = on_attitude_branch(scenario, recording)
     made = [_simulators(one, recording, reference) for one in (scenario, diagnosed) if one is not None]
     full = [runs for _, *both, _ in made for one in both if (runs := full_runs(one)) is not None]
@@ -152,7 +152,7 @@ def _told(
                 scatter=np.sqrt(np.sum(np.square(more), axis=0)) if more else None,
             )
         )
-    return Told(
+    return Overlay(
         recording=name,
         title=recording.title,
         held_out=held_out,

@@ -66,7 +66,7 @@ def reported(c: Conclusion) -> Diagnosis:
     if verdict == "unexplained" and c.acts == "drop" and shown is None:
         asked.say("a law for the unexplained residual")
         law = proposed(problem, explanation.base, set_ups, found, groups)
-    told_of = {} if asked.discrepancy is None else asked.discrepancy.told(found)
+    told_of = {} if asked.discrepancy is None else asked.discrepancy.scales_by_channel(found)
     detectable = dict(explanation.detectable)
     contrary = inconsistent_repeats(found, SETTINGS.data.repeatability.contradiction)
     if verdict == "no-mismatch" and not c.slight and (contrary or is_weak(detectable)):

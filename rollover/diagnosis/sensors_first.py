@@ -40,8 +40,8 @@ def sensor_precheck(scenario: Scenario, measured: Mapping[str, Recording]) -> li
         own = set_up(scenario, recording)
         mass = getattr(own.vehicle, "mass", None)
         found += [(name, f) for f in prechecks(recording, mass=mass, gravity=own.gravity)]
-    told = {(name, f.check, f.channel) for name, f in found}
-    return found + [(name, f) for name, f in shared_rails(measured) if (name, f.check, f.channel) not in told]
+    found_before = {(name, f.check, f.channel) for name, f in found}
+    return found + [(name, f) for name, f in shared_rails(measured) if (name, f.check, f.channel) not in found_before]
 
 
 def diagnosed(

@@ -35,10 +35,10 @@ def named(
     """
     fitted, held = found.fitted, problem.dataset
     fine = refined_by_ensemble_mean(problem, fitted)
-    told = intervals(problem, fine, coarse=fitted)
+    settings_of = intervals(problem, fine, coarse=fitted)
     if fine is not fitted:
         problem.with_noise_model(held)
-    settings = {c.key: s for c, s in zip(fitted.candidates, told, strict=True)}
+    settings = {c.key: s for c, s in zip(fitted.candidates, settings_of, strict=True)}
     by_key = {s.fitted.candidates[-1].key: s for s in found.parts}
     effects = []
     for c in fitted.effects:
@@ -106,7 +106,7 @@ def interval_contains_null(effects: Sequence[Named], scattering: bool) -> set[st
     One alone has no other's gain: where runs are not `scattering` it is there, only how strong it is cannot be told. So
     it is with what does something at its least.
     """
-    if len(effects) == 1 and (not scattering or EFFECTS[effects[0].id].is_sudden):
+    if len(effects) == 1 and (not scattering or EFFECTS[effects[0].id].is_discontinuous):
         return set()
     return {e.id for e in effects if is_null_effect(e)}
 

@@ -63,10 +63,10 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     number = len(owner)
     capacity = 2 * number + 64
     hidden = HIDDEN + max(law.hidden for law, _ in rows)
-    told = [settings(law, *acting(scenario.effects)) for law, _ in rows]
-    integers = np.array([whole for whole, _ in told], dtype=np.int64)
-    numbers = np.zeros((len(rows), max(len(p) for _, p in told)))
-    for k, (_, p) in enumerate(told):
+    kernel_settings = [settings(law, *acting(scenario.effects)) for law, _ in rows]
+    integers = np.array([whole for whole, _ in kernel_settings], dtype=np.int64)
+    numbers = np.zeros((len(rows), max(len(p) for _, p in kernel_settings)))
+    for k, (_, p) in enumerate(kernel_settings):
         numbers[k, : len(p)] = p
     # nothing of the ground moves along, or could begin to, and it does not remember shear
     still = ground.co_moving_mass.share == 0.0
@@ -75,7 +75,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         and still
         and p[whole[EFFECTS] + GROWTH] == 0.0
         and isinstance(place.friction or ground.friction, Coulomb)
-        for (law, place), (whole, p) in zip(rows, told, strict=True)
+        for (law, place), (whole, p) in zip(rows, kernel_settings, strict=True)
     ]
     return Tables(
         mass=mass,

@@ -143,10 +143,10 @@ class DropModel:
         return f
 
     @cached_property
-    def told(self) -> tuple[NDArray[np.int64], Array]:
+    def kernel_law(self) -> tuple[NDArray[np.int64], Array]:
         """Settings and numbers of the ground's kernel."""
         s = self._applied
-        return _told(Itself(s.ground.law), Itself(s.effects))
+        return _kernel_law(Itself(s.ground.law), Itself(s.effects))
 
     @property
     def times(self) -> Array:
@@ -159,7 +159,7 @@ class DropModel:
 
     def track(self, until: float) -> Track:
         """The fall up to a time (s), or to rest if that comes first. Raises `DropFailedError`."""
-        law, p = self.told
+        law, p = self.kernel_law
         memory = HIDDEN + self.scenario.ground.law.hidden
         steps, elements, stayed = drop_integrator.fall(law, p, memory, self.numbers, until)
         if not stayed:
@@ -188,7 +188,7 @@ class DropModel:
 
 
 @lru_cache(maxsize=TOLD)
-def _told(law: Itself, effects: Itself) -> tuple[NDArray[np.int64], Array]:
+def _kernel_law(law: Itself, effects: Itself) -> tuple[NDArray[np.int64], Array]:
     return settings(law.thing, *acting(effects.thing))
 
 

@@ -21,13 +21,13 @@ Kind = Literal["physics", "parameter", "sensor"]
 class Search(NamedTuple):
     """Where to look for a parameter: from `low` to `high`, in even steps of the value or of its logarithm.
 
-    `told` is a value that recordings show by themselves, and that is looked at beside others.
+    `suggested` is a value that recordings show by themselves, and that is looked at beside others.
     """
 
     low: float
     high: float
     scale: Literal["log", "linear"] = "linear"
-    told: float | None = None
+    suggested: float | None = None
 
 
 class Heard(NamedTuple):
@@ -80,7 +80,7 @@ class Effect:
     ] = {}  # parameter -> places in its range, near which alone it tells
     is_abrupt: ClassVar[bool] = False  # it rings, or turns from one instant to the next: drops take shorter steps
     is_smooth: ClassVar[bool] = False  # its force terms jump nowhere: drops take no shorter steps for them
-    is_sudden: ClassVar[bool] = False  # its least strength does something already: slopes there lead nowhere
+    is_discontinuous: ClassVar[bool] = False  # its least strength does something already: slopes there lead nowhere
     # an effect of fewer numbers that it becomes at an end of its range -> which of its own numbers that one's are, and
     # how many times as large
     becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {}

@@ -270,7 +270,7 @@ class SoilAdhesion(Effect):
     null: ClassVar[Mapping[str, float | None]] = {"stress": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"stress": Search(500.0, 2e5, "log"), "reach": Search(5e-4, 0.05, "log")}
     shapes = ("reach",)
-    is_sudden = True  # what moves along stays on the face until it lets go
+    is_discontinuous = True  # what moves along stays on the face until it lets go
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"stress": (1.0, -1.0)}
 
     def places(self) -> Mapping[int, float]:

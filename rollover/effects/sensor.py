@@ -372,7 +372,7 @@ class SensorClipping(Effect):
     def looked_for_on(cls, heard: Heard) -> Mapping[str, Search] | None:
         """Up to a little above all that the channel moves over; where its values end, if they do."""
         low, high = 0.1 * heard.spans[heard.channel], 1.05 * heard.spans[heard.channel]
-        return {"limit": Search(low, high, told=heard.end if low < heard.end < high else None)}
+        return {"limit": Search(low, high, suggested=heard.end if low < heard.end < high else None)}
 
     def read(self, recording: Recording) -> Recording:
         """Cut the channel off."""

@@ -74,7 +74,7 @@ class Background:
 
         return replace(rig, background=off)
 
-    def told(self, share: float) -> dict[str, Any]:
+    def summary(self, share: float) -> dict[str, Any]:
         """What the sealed truth says of it."""
         frame = {"frequency": self.swing.frequency, "decay": self.swing.decay}
         return {"share": share, "family": self.family, "common": self.common, "frame": frame}

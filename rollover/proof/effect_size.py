@@ -70,7 +70,7 @@ class Concealed(Protocol):
         """Physics, parameter, sensor or outside."""
 
     @property
-    def told(self) -> Mapping[str, float]:
+    def parameters(self) -> Mapping[str, float]:
         """Its parameters."""
 
     @property
@@ -102,7 +102,7 @@ def entry(change: Concealed, found: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "id": change.id,
         "kind": change.kind,
-        "parameters": {name: float(value) for name, value in change.told.items()},
+        "parameters": {name: float(value) for name, value in change.parameters.items()},
         "channel": change.channel,
         "depends_on": change.depends_on,
         "near": list(change.near),

@@ -22,8 +22,8 @@ START = -0.09  # s, about where recordings begin
 def _form(name: str, source: str, channels: tuple[str, ...], draw: Callable[[Random, Setting, str], Drawn]) -> Form:
     def made(random: Random, s: Setting, id: str) -> Change:
         channel = str(random.choice([c for c in s.channels if c in channels]))
-        told, fault = draw(random, s, channel)
-        return Change(id=id, kind="sensor", told=told, channel=channel, fault=fault)
+        parameters, fault = draw(random, s, channel)
+        return Change(id=id, kind="sensor", parameters=parameters, channel=channel, fault=fault)
 
     return Form(name=name, source=source, draw=made)
 

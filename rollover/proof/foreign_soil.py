@@ -81,8 +81,8 @@ def _exponential(random: Random, s: Setting, id: str) -> Change:
     def law(t: float, z: float, v: float, force: float) -> float:
         return force + most * (z / thickness if z < thickness else math.exp(-(z - thickness) / length))
 
-    told = {"thickness": thickness, "force": most, "length": length}
-    return resisting(id, told, "depth", law, breaks=(thickness,))
+    parameters = {"thickness": thickness, "force": most, "length": length}
+    return resisting(id, parameters, "depth", law, breaks=(thickness,))
 
 
 def _linear(random: Random, s: Setting, id: str) -> Change:
@@ -93,8 +93,8 @@ def _linear(random: Random, s: Setting, id: str) -> Change:
     def law(t: float, z: float, v: float, force: float) -> float:
         return force + most * (z / thickness if z < thickness else max(1.0 - (z - thickness) / length, 0.0))
 
-    told = {"thickness": thickness, "force": most, "length": length}
-    return resisting(id, told, "depth", law, breaks=(thickness, thickness + length))
+    parameters = {"thickness": thickness, "force": most, "length": length}
+    return resisting(id, parameters, "depth", law, breaks=(thickness, thickness + length))
 
 
 def _profile(random: Random, s: Setting, id: str) -> Change:
@@ -149,8 +149,8 @@ def _recovery(random: Random) -> tuple[float, float]:
 def _oliver_pharr(random: Random, s: Setting, id: str) -> Change:
     """F = F_max x^m on the way back, x from 1 at the deepest point to 0 in the rut."""
     (recovery, damped), m = _recovery(random), uniform(random, 1.3, 2.2)
-    told = {"recovery": recovery, "damping_ratio": damped, "power": m}
-    return physics(id, told, "depth", recovery=recovery, unloading_ratio=damped, unloading=lambda x: x**m)
+    parameters = {"recovery": recovery, "damping_ratio": damped, "power": m}
+    return physics(id, parameters, "depth", recovery=recovery, unloading_ratio=damped, unloading=lambda x: x**m)
 
 
 def _bent(random: Random, s: Setting, id: str) -> Change:
@@ -160,19 +160,19 @@ def _bent(random: Random, s: Setting, id: str) -> Change:
     def unloading(x: float) -> float:
         return force / way * x if x < way else force + (1.0 - force) * (x - way) / (1.0 - way)
 
-    told = {"recovery": recovery, "damping_ratio": damped, "force_share": force, "way_share": way}
-    return physics(id, told, "depth", recovery=recovery, unloading_ratio=damped, unloading=unloading)
+    parameters = {"recovery": recovery, "damping_ratio": damped, "force_share": force, "way_share": way}
+    return physics(id, parameters, "depth", recovery=recovery, unloading_ratio=damped, unloading=unloading)
 
 
 def _exponential_return(random: Random, s: Setting, id: str) -> Change:
     """F = F_max (exp(b x) - 1)/(exp(b) - 1)."""
     (recovery, damped), b = _recovery(random), uniform(random, 1.5, 4.0)
-    told = {"recovery": recovery, "damping_ratio": damped, "curvature": b}
+    parameters = {"recovery": recovery, "damping_ratio": damped, "curvature": b}
 
     def unloading(x: float) -> float:
         return math.expm1(b * min(x, 2.0)) / math.expm1(b)
 
-    return physics(id, told, "depth", recovery=recovery, unloading_ratio=damped, unloading=unloading)
+    return physics(id, parameters, "depth", recovery=recovery, unloading_ratio=damped, unloading=unloading)
 
 
 def _pull(random: Random) -> tuple[float, float]:
@@ -182,15 +182,17 @@ def _pull(random: Random) -> tuple[float, float]:
 def _dugdale(random: Random, s: Setting, id: str) -> Change:
     """The full stress up to a gap, then nothing."""
     stress, reach = _pull(random)
-    told = {"stress": stress, "gap": reach}
-    return physics(id, told, "depth", pull=stress * FACE, reach=reach, holding=lambda gap: 1.0)
+    parameters = {"stress": stress, "gap": reach}
+    return physics(id, parameters, "depth", pull=stress * FACE, reach=reach, holding=lambda gap: 1.0)
 
 
 def _decaying(random: Random, s: Setting, id: str) -> Change:
     """Exponentially less with the gap; at six lengths it ends."""
     stress, length = _pull(random)
-    told = {"stress": stress, "length": length}
-    return physics(id, told, "depth", pull=stress * FACE, reach=6.0 * length, holding=lambda gap: math.exp(-6.0 * gap))
+    parameters = {"stress": stress, "length": length}
+    return physics(
+        id, parameters, "depth", pull=stress * FACE, reach=6.0 * length, holding=lambda gap: math.exp(-6.0 * gap)
+    )
 
 
 def _cohesive(random: Random, s: Setting, id: str) -> Change:
@@ -200,8 +202,8 @@ def _cohesive(random: Random, s: Setting, id: str) -> Change:
     def holding(gap: float) -> float:
         return gap / peak if gap < peak else (1.0 - gap) / (1.0 - peak)
 
-    told = {"stress": stress, "gap": reach, "peak": peak}
-    return physics(id, told, "depth", pull=stress * FACE, reach=reach, holding=holding)
+    parameters = {"stress": stress, "gap": reach, "peak": peak}
+    return physics(id, parameters, "depth", pull=stress * FACE, reach=reach, holding=holding)
 
 
 def _joining(random: Random) -> tuple[float, float]:

@@ -26,8 +26,8 @@ def _duffing(random: Random, s: Setting, id: str) -> Change:
     def joint(u: float, w: float) -> float:
         return k * u * (1.0 + (u / at) ** 2) + c * w
 
-    told = {"linear": k, "dashpot": c, "nose": share, "closing": at}
-    return physics(id, told, "acceleration", spring=k, dashpot=c, nose_share=share, joint=joint)
+    parameters = {"linear": k, "dashpot": c, "nose": share, "closing": at}
+    return physics(id, parameters, "acceleration", spring=k, dashpot=c, nose_share=share, joint=joint)
 
 
 def _softening(random: Random, s: Setting, id: str) -> Change:
@@ -38,8 +38,8 @@ def _softening(random: Random, s: Setting, id: str) -> Change:
     def joint(u: float, w: float) -> float:
         return k * at * math.tanh(u / at) + c * w
 
-    told = {"linear": k, "dashpot": c, "nose": share, "closing": at}
-    return physics(id, told, "acceleration", spring=k, dashpot=c, nose_share=share, joint=joint)
+    parameters = {"linear": k, "dashpot": c, "nose": share, "closing": at}
+    return physics(id, parameters, "acceleration", spring=k, dashpot=c, nose_share=share, joint=joint)
 
 
 def _square_damping(random: Random, s: Setting, id: str) -> Change:
@@ -50,8 +50,8 @@ def _square_damping(random: Random, s: Setting, id: str) -> Change:
     def joint(u: float, w: float) -> float:
         return k * u + square * abs(w) * w
 
-    told = {"linear": k, "square": square, "nose": share}
-    return physics(id, told, "acceleration", spring=k, dashpot=c, nose_share=share, joint=joint)
+    parameters = {"linear": k, "square": square, "nose": share}
+    return physics(id, parameters, "acceleration", spring=k, dashpot=c, nose_share=share, joint=joint)
 
 
 def _dry_joint(random: Random, s: Setting, id: str) -> Change:
@@ -61,8 +61,8 @@ def _dry_joint(random: Random, s: Setting, id: str) -> Change:
     def joint(u: float, w: float) -> float:
         return k * u + dry * math.tanh(w / 0.01)
 
-    told = {"linear": k, "friction": dry, "nose": share}
-    return physics(id, told, "acceleration", spring=k, dashpot=dry / 0.01, nose_share=share, joint=joint)
+    parameters = {"linear": k, "friction": dry, "nose": share}
+    return physics(id, parameters, "acceleration", spring=k, dashpot=dry / 0.01, nose_share=share, joint=joint)
 
 
 def _rubs(random: Random) -> float:
@@ -104,9 +104,9 @@ def _lugre(random: Random, s: Setting, id: str) -> Change:
     def level(v: float) -> float:
         return force + (static - force) * math.exp(-((v / slow) ** 2))
 
-    told = {"kinetic": force, "static": static, "speed": slow, "bristles": stiffness, "viscous": viscous}
+    parameters = {"kinetic": force, "static": static, "speed": slow, "bristles": stiffness, "viscous": viscous}
     bristle = Bristle(stiffness=stiffness, damping=damping, viscous=viscous, level=level)
-    return physics(id, told, "speed", bristle=bristle)
+    return physics(id, parameters, "speed", bristle=bristle)
 
 
 def _lubricated(random: Random, s: Setting, id: str) -> Change:

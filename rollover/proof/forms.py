@@ -23,16 +23,16 @@ class Form:
     draw: Callable[[Random, Setting, str], Change]
 
 
-def physics(id: str, told: Mapping[str, float], depends_on: str, kind: str = "physics", **rig: Any) -> Change:
-    """A change of the rig; `told` are the law's numbers."""
-    return Change(id=id, kind=kind, told=told, rig=rig, depends_on=depends_on)
+def physics(id: str, parameters: Mapping[str, float], depends_on: str, kind: str = "physics", **rig: Any) -> Change:
+    """A change of the rig; `parameters` are the law's numbers."""
+    return Change(id=id, kind=kind, parameters=parameters, rig=rig, depends_on=depends_on)
 
 
 def resisting(
-    id: str, told: Mapping[str, float], depends_on: str, resist: Resist, kind: str = "physics", **rig: Any
+    id: str, parameters: Mapping[str, float], depends_on: str, resist: Resist, kind: str = "physics", **rig: Any
 ) -> Change:
     """A change of what the ground resists with on the way down."""
-    return physics(id, told, depends_on, kind, resist=resist, **rig)
+    return physics(id, parameters, depends_on, kind, resist=resist, **rig)
 
 
 def strength(random: Random) -> float:

@@ -210,7 +210,7 @@ def make(order: Order) -> Case:
         each.append(against(measured(held, rest, None, around) if rest else nothing))
     truth = _truth(order, held, changes, each, against(nothing) if changes else None, sigma, recordings)
     if around is not None:
-        truth["background"] = around.told(order.background) | {"channels": off}
+        truth["background"] = around.summary(order.background) | {"channels": off}
         if changes:  # of the mean square of what is missing, over the noise
             whole, rest = (between(shown, bare)["signal_to_noise"] ** 2 for shown in (made, nothing))
             truth["explains"] = 1.0 - rest / whole if whole > 0.0 else None
@@ -255,9 +255,9 @@ def _drawn(random: np.random.Generator, order: Order, id: str, setting: Setting)
     known = foreign.EFFECTS if order.kind == "foreign-form" else {**library.EFFECTS, **outside.OUTSIDE}
     change = known[id](random, setting)
     if order.kind == "negligible" and id == "soil-inertial-drag":
-        return replace(change, told={"coefficient": 0.002}, rig={"drag": 0.5 * 0.002 * 1800.0 * 0.0063})
+        return replace(change, parameters={"coefficient": 0.002}, rig={"drag": 0.5 * 0.002 * 1800.0 * 0.0063})
     if order.kind == "negligible" and id == "guide-friction":
-        return replace(change, told={"force": 0.05}, rig={"guide": 0.05})
+        return replace(change, parameters={"force": 0.05}, rig={"guide": 0.05})
     return change
 
 
@@ -332,7 +332,7 @@ def _truth(
         "seed": order.seed,
         "index": order.index,
         "verdict": verdict,
-        "effects": [entry(change, told) for change, told in zip(changes, each, strict=True)],
+        "effects": [entry(change, parameters) for change, parameters in zip(changes, each, strict=True)],
         "over_noise": float(whole["over_noise"]) if whole is not None else 0.0,
         "signal_to_noise": float(whole["signal_to_noise"]) if whole is not None else 0.0,
         "where": whole["where"] if whole is not None else [],

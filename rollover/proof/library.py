@@ -35,11 +35,11 @@ class Setting:
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """An effect at a strength: `told` are its parameters by the names of the contract."""
+    """An effect at a strength: `parameters` by the names of the contract."""
 
     id: str
     kind: str  # physics, parameter, sensor, outside
-    told: Mapping[str, float]
+    parameters: Mapping[str, float]
     rig: Mapping[str, Any] = field(default_factory=dict)
     factors: Mapping[str, float] = field(default_factory=dict)  # numbers of the rig that are multiplied
     channel: str = ""
@@ -59,8 +59,8 @@ def _either(random: Random, low: float, high: float) -> float:
     return math.exp(log_uniform(random, low, high) * random.choice((-1.0, 1.0)))
 
 
-def _physics(id: str, told: Mapping[str, float], depends_on: str, **rig: Any) -> Change:
-    return Change(id=id, kind="physics", told=told, rig=rig, depends_on=depends_on)
+def _physics(id: str, parameters: Mapping[str, float], depends_on: str, **rig: Any) -> Change:
+    return Change(id=id, kind="physics", parameters=parameters, rig=rig, depends_on=depends_on)
 
 
 def _viscous(random: Random, s: Setting) -> Change:
@@ -69,8 +69,8 @@ def _viscous(random: Random, s: Setting) -> Change:
         return _physics("soil-viscous-damping", {"proportion": proportion}, "speed", proportion=proportion)
     exponent = 1.0 if random.random() < 0.6 and not s.other_forms else float(random.uniform(0.85, 1.2))
     d = log_uniform(random, 6.0, 3000.0)
-    told = {"damping": d, "exponent": exponent}
-    return _physics("soil-viscous-damping", told, "speed", damping=d, exponent=exponent)
+    parameters = {"damping": d, "exponent": exponent}
+    return _physics("soil-viscous-damping", parameters, "speed", damping=d, exponent=exponent)
 
 
 def _rate(random: Random, s: Setting) -> Change:
@@ -85,8 +85,8 @@ def _rate(random: Random, s: Setting) -> Change:
 def _drag(random: Random, s: Setting) -> Change:
     c = log_uniform(random, 0.08, 40.0)
     power = float(random.uniform(1.9, 2.1)) if s.other_forms else 2.0
-    told = {"coefficient": c}
-    return _physics("soil-inertial-drag", told, "speed", drag=0.5 * c * 1800.0 * FACE, drag_exponent=power)
+    parameters = {"coefficient": c}
+    return _physics("soil-inertial-drag", parameters, "speed", drag=0.5 * c * 1800.0 * FACE, drag_exponent=power)
 
 
 def _growth(random: Random, s: Setting) -> Change:
@@ -96,8 +96,8 @@ def _growth(random: Random, s: Setting) -> Change:
 
 def _rebound(random: Random, s: Setting) -> Change:
     recovery, ratio = log_uniform(random, 0.021, 0.3), float(random.uniform(0.05, 0.9))
-    told = {"recovery": recovery, "damping_ratio": ratio}
-    return _physics("soil-elastic-rebound", told, "depth", recovery=recovery, unloading_ratio=ratio)
+    parameters = {"recovery": recovery, "damping_ratio": ratio}
+    return _physics("soil-elastic-rebound", parameters, "depth", recovery=recovery, unloading_ratio=ratio)
 
 
 def _adhesion(random: Random, s: Setting) -> Change:
@@ -110,36 +110,36 @@ def _layer(random: Random, s: Setting) -> Change:
     depth, ratio = float(random.uniform(0.15, 0.8)) * reached, _either(random, 0.006, 1.2)
     if s.other_forms and random.random() < ANOTHER:
         spring = log_uniform(random, 100.0, 4e4)
-        told = {"depth": depth, "stiffness": spring}
-        return _physics("soil-layer", told, "depth", layer_depth=depth, layer_spring=spring)
+        parameters = {"depth": depth, "stiffness": spring}
+        return _physics("soil-layer", parameters, "depth", layer_depth=depth, layer_spring=spring)
     width = float(random.uniform(0.001, 0.02)) if s.other_forms else 0.0
     onset = float(random.choice((0.0, 1.0))) if s.other_forms else 0.0
-    told = {"depth": depth, "stiffness_ratio": ratio}
+    parameters = {"depth": depth, "stiffness_ratio": ratio}
     own = {"layer_depth": depth, "layer_ratio": ratio, "layer_width": width if onset == 0.0 else 0.0}
-    return _physics("soil-layer", told, "depth", layer_onset=onset, **own)
+    return _physics("soil-layer", parameters, "depth", layer_onset=onset, **own)
 
 
 def _crust(random: Random, s: Setting) -> Change:
     depth, ratio = float(random.uniform(0.012, 0.08)), _either(random, 0.012, 1.2)
     width = float(random.uniform(0.001, 0.003)) if s.other_forms else 0.0
     remains = float(random.choice((0.0, 1.0))) if s.other_forms else 0.0
-    told = {"thickness": depth, "stiffness_ratio": ratio}
+    parameters = {"thickness": depth, "stiffness_ratio": ratio}
     own = {"crust_depth": depth, "crust_ratio": ratio, "crust_width": width if remains == 0.0 else 0.0}
-    return _physics("soil-crust", told, "depth", crust_remains=remains, **own)
+    return _physics("soil-crust", parameters, "depth", crust_remains=remains, **own)
 
 
 def _compliance(random: Random, s: Setting) -> Change:
     k, c = log_uniform(random, 1e5, 5e6), log_uniform(random, 60.0, 2000.0)
     share = log_uniform(random, 0.05, 0.3)
-    told = {"stiffness": k, "damping": c, "nose_share": share}
-    return _physics("structural-compliance", told, "acceleration", spring=k, dashpot=c, nose_share=share)
+    parameters = {"stiffness": k, "damping": c, "nose_share": share}
+    return _physics("structural-compliance", parameters, "acceleration", spring=k, dashpot=c, nose_share=share)
 
 
 def _guide(random: Random, s: Setting) -> Change:
     force = log_uniform(random, 1.0, 300.0)
     creep = log_uniform(random, 1e-3, 1e-2) if random.random() < 0.5 else 0.0
-    told = {"force": force, **({"creep": creep} if creep else {})}
-    return _physics("guide-friction", told, "speed", guide=force, guide_creep=creep)
+    parameters = {"force": force, **({"creep": creep} if creep else {})}
+    return _physics("guide-friction", parameters, "speed", guide=force, guide_creep=creep)
 
 
 def _air(random: Random, s: Setting) -> Change:
@@ -149,29 +149,29 @@ def _air(random: Random, s: Setting) -> Change:
 
 def _mass(random: Random, s: Setting) -> Change:
     added = log_uniform(random, 0.1, 20.0) * float(random.choice((-1.0, 1.0)))
-    return Change(id="mass", kind="parameter", told={"added": added}, rig={"mass": 132.0 + added})
+    return Change(id="mass", kind="parameter", parameters={"added": added}, rig={"mass": 132.0 + added})
 
 
 def _speed(random: Random, s: Setting) -> Change:
     scale = _either(random, 0.0008, 0.08)
-    return Change(id="impact-speed", kind="parameter", told={"scale": scale}, factors={"speed": scale})
+    return Change(id="impact-speed", kind="parameter", parameters={"scale": scale}, factors={"speed": scale})
 
 
 def _stiffness(random: Random, s: Setting) -> Change:
     scale = _either(random, 0.001, 0.35)
-    return Change(id="soil-stiffness", kind="parameter", told={"scale": scale}, factors={"stiffness": scale})
+    return Change(id="soil-stiffness", kind="parameter", parameters={"scale": scale}, factors={"stiffness": scale})
 
 
 def _soil_mass(random: Random, s: Setting) -> Change:
     fraction = 0.10 * _either(random, 0.012, 1.2)
-    return Change(id="co-moving-mass", kind="parameter", told={"fraction": fraction}, rig={"fraction": fraction})
+    return Change(id="co-moving-mass", kind="parameter", parameters={"fraction": fraction}, rig={"fraction": fraction})
 
 
 def _sensor(id: str, channels: tuple[str, ...], draw: Callable[[Random, Setting, str], tuple[Any, ...]]) -> Draw:
     def made(random: Random, s: Setting) -> Change:
         channel = str(random.choice([c for c in s.channels if c in channels]))
-        told, fault = draw(random, s, channel)
-        return Change(id=id, kind="sensor", told=told, channel=channel, fault=fault)
+        parameters, fault = draw(random, s, channel)
+        return Change(id=id, kind="sensor", parameters=parameters, channel=channel, fault=fault)
 
     return made
 
@@ -186,8 +186,8 @@ def _pair(name: str, field_name: str, value: float) -> tuple[dict[str, float], d
 
 def _lag(random: Random, s: Setting, channel: str) -> tuple[dict[str, float], dict[str, float]]:
     """Of first order; where it may differ, half of them of second, as by Butterworth."""
-    told, fault = _pair("time", "lag", log_uniform(random, 3e-4, 1.2e-2))
-    return told, {**fault, "second_order": 0.5} if s.other_forms and random.random() < 0.5 else fault
+    parameters, fault = _pair("time", "lag", log_uniform(random, 3e-4, 1.2e-2))
+    return parameters, {**fault, "second_order": 0.5} if s.other_forms and random.random() < 0.5 else fault
 
 
 # gains act on amplifiers, scales on lengths: the same law, another instrument

@@ -15,8 +15,8 @@ from rollover.proof.library import Change, Draw, Random, Setting
 BENT = ("sensor-gain", "sensor-scale", "sensor-bias", "sensor-clipping")
 
 
-def _law(id: str, depends_on: str, told: dict[str, float], near: tuple[str, ...] = (), **rig: Any) -> Change:
-    return Change(id=id, kind="outside", told=told, rig=rig, depends_on=depends_on, near=near)
+def _law(id: str, depends_on: str, parameters: dict[str, float], near: tuple[str, ...] = (), **rig: Any) -> Change:
+    return Change(id=id, kind="outside", parameters=parameters, rig=rig, depends_on=depends_on, near=near)
 
 
 def _on(random: Random, s: Setting, *channels: str) -> str:
@@ -24,7 +24,9 @@ def _on(random: Random, s: Setting, *channels: str) -> str:
 
 
 def _fault(id: str, depends_on: str, channel: str, near: tuple[str, ...] = (), **fault: float) -> Change:
-    return Change(id=id, kind="outside", told=fault, channel=channel, fault=fault, depends_on=depends_on, near=near)
+    return Change(
+        id=id, kind="outside", parameters=fault, channel=channel, fault=fault, depends_on=depends_on, near=near
+    )
 
 
 def _ringing(random: Random, s: Setting) -> Change:
@@ -34,8 +36,8 @@ def _ringing(random: Random, s: Setting) -> Change:
     def push(t: float, x: float, v: float) -> float:
         return a * math.sin(2.0 * math.pi * f * t) * math.exp(-t / tau) if t > 0.0 else 0.0
 
-    told = {"amplitude": a, "frequency": float(f), "decay": float(tau)}
-    return _law("outside:ringing", "time", told, ("structural-compliance",), push=push)
+    parameters = {"amplitude": a, "frequency": float(f), "decay": float(tau)}
+    return _law("outside:ringing", "time", parameters, ("structural-compliance",), push=push)
 
 
 def _brake(random: Random, s: Setting) -> Change:
@@ -51,9 +53,9 @@ def _brake(random: Random, s: Setting) -> Change:
 def _memory(random: Random, s: Setting) -> Change:
     """Soil that relaxes: a Maxwell branch beside the spring."""
     k, tau = log_uniform(random, 1e3, 3e4), random.uniform(0.02, 0.08)
-    told = {"stiffness": k, "time": float(tau)}
+    parameters = {"stiffness": k, "time": float(tau)}
     near = ("soil-viscous-damping", "soil-rate-hardening")
-    return _law("outside:memory", "time", told, near, relaxing=k, relaxation=float(tau))
+    return _law("outside:memory", "time", parameters, near, relaxing=k, relaxation=float(tau))
 
 
 def _bands(random: Random, s: Setting) -> Change:
@@ -63,8 +65,8 @@ def _bands(random: Random, s: Setting) -> Change:
     def resist(t: float, z: float, v: float, force: float) -> float:
         return force * (1.0 + a * math.sin(2.0 * math.pi * z / length))
 
-    told = {"amplitude": a, "length": float(length)}
-    return _law("outside:bands", "depth", told, ("soil-layer", "soil-crust"), resist=resist)
+    parameters = {"amplitude": a, "length": float(length)}
+    return _law("outside:bands", "depth", parameters, ("soil-layer", "soil-crust"), resist=resist)
 
 
 def _stone(random: Random, s: Setting) -> Change:
@@ -75,8 +77,8 @@ def _stone(random: Random, s: Setting) -> Change:
     def resist(t: float, z: float, v: float, force: float) -> float:
         return force + a * math.exp(-(((z - at) / width) ** 2))
 
-    told = {"force": a, "depth": float(at), "width": float(width)}
-    return _law("outside:stone", "depth", told, ("soil-layer",), resist=resist)
+    parameters = {"force": a, "depth": float(at), "width": float(width)}
+    return _law("outside:stone", "depth", parameters, ("soil-layer",), resist=resist)
 
 
 def _cubic(random: Random, s: Setting) -> Change:
@@ -107,9 +109,9 @@ def _resonance(random: Random, s: Setting) -> Change:
     def resist(t: float, z: float, v: float, force: float) -> float:
         return force + a * math.exp(-(((v - at) / width) ** 2))
 
-    told = {"force": a, "speed": float(at), "width": float(width)}
+    parameters = {"force": a, "speed": float(at), "width": float(width)}
     near = ("soil-viscous-damping", "soil-rate-hardening", "soil-inertial-drag")
-    return _law("outside:resonance", "speed", told, near, resist=resist)
+    return _law("outside:resonance", "speed", parameters, near, resist=resist)
 
 
 def _side_load(random: Random, s: Setting) -> Change:
@@ -125,7 +127,7 @@ def _by_speed(random: Random, s: Setting) -> Change:
     return Change(
         id="outside:stiffness-by-impact-speed",
         kind="outside",
-        told={"power": power},
+        parameters={"power": power},
         speed_power=power,
         depends_on="impact-speed",
         near=("soil-rate-hardening", "soil-stiffness", "soil-viscous-damping"),

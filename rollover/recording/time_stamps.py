@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 ROUNDINGS = 2.0  # steps of a double that two stamps may be off by: half a one each, and as much for how they were made
 DIGITS = 15  # that a double surely holds
-Told = Literal["onset", "alignment", "deceleration"]
+Method = Literal["onset", "alignment", "deceleration"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +29,7 @@ class Zero:
 
     late: float
     sigma: float
-    by: Told
+    by: Method
     why: Literal["unknown", "within", "off", "apart"]
     channels: tuple[str, ...]
 

@@ -65,8 +65,8 @@ def in_words(estimates: tuple[Estimate, ...]) -> str:
     alike: dict[tuple[str, str, str], list[str]] = {}
     for e in estimates:
         alike.setdefault((f"{e.value:.3g}", e.unit, e.provenance.source), []).append(e.path)
-    told = [f"{', '.join(paths)} = {value} {unit} ({how})" for (value, unit, how), paths in alike.items()]
-    return f"Estimated, for the vehicle states none: {'; '.join(told)}" if told else ""
+    sentences = [f"{', '.join(paths)} = {value} {unit} ({how})" for (value, unit, how), paths in alike.items()]
+    return f"Estimated, for the vehicle states none: {'; '.join(sentences)}" if sentences else ""
 
 
 def _share(vehicle: Vehicle, wheel: Wheel) -> float:

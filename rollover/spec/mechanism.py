@@ -92,12 +92,12 @@ def sentence(motions: Sequence[FreeMotion]) -> str:
     got = _listed([f"{v:g}" for v in sorted({v for j in first.joints for v in _own(j, alike)})])
     need = f"more than {max(m.needed for m in alike):.4g} {unit}"
     if len(paths) == 1:
-        told = f"{paths[0]}.{what}: {motion}, got {got} {unit} {way} {axes}; {need}"
+        motion_line = f"{paths[0]}.{what}: {motion}, got {got} {unit} {way} {axes}; {need}"
     else:
         names = _listed([j.connector.name for j in first.joints])
-        told = f"{group}: {motion}, got {what} {got} {unit} {way} {axes} at {names}; {need} together"
+        motion_line = f"{group}: {motion}, got {what} {got} {unit} {way} {axes} at {names}; {need} together"
     other = f", or a further one of {group} off this {'axis' if len(alike) == 1 else 'point'}" if first.turns else ""
-    return f"{told} against its weight{other}"
+    return f"{motion_line} against its weight{other}"
 
 
 def in_words(alike: Sequence[FreeMotion]) -> str:

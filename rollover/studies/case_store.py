@@ -178,9 +178,9 @@ def kept(folder: Path, key: str) -> Row | None:
         measures, about = read_pairs(path_of(folder, key))
         texts = [about[name] for name in ("status", "failure", "sentence")]
         texts += [*about["domain_flags"], *about["peak_flags"]]
-        told = about["provenance"].items()
+        recorded = about["provenance"].items()
         is_own = about["key"] == key and about["status"] in ("done", "failed")
-        is_own = is_own and all(v is None or isinstance(v, _TYPES.get(name, str)) for name, v in told)
+        is_own = is_own and all(v is None or isinstance(v, _TYPES.get(name, str)) for name, v in recorded)
         if not is_own or None in (*measures, *measures.values()) or not all(isinstance(text, str) for text in texts):
             return None  # somebody else wrote it
         return Row(
@@ -214,11 +214,11 @@ def on_shelf(folder: Path) -> set[str]:
 def read_plan(folder: Path, about: str) -> list[str] | None:
     """Keys of all points if they were worked out for this very plan before."""
     try:
-        columns, told = read_table(folder / PLAN)
+        columns, recorded = read_table(folder / PLAN)
     except UnreadableError:
         return None
     keys = columns.get("case", [])
-    return keys if told.get("plan") == about and keys and all(isinstance(key, str) for key in keys) else None
+    return keys if recorded.get("plan") == about and keys and all(isinstance(key, str) for key in keys) else None
 
 
 def write_plan(folder: Path, about: str, keys: Sequence[str], columns: Mapping[str, Any]) -> None:
@@ -249,9 +249,9 @@ def compact(folder: Path, study: Study, keys: Sequence[str], columns: Mapping[st
         meanings[axis.name] = {"meaning": f"{axis.apply} at {', '.join(axis.paths)}", "unit": ""}
     about = {"format": "rollover-study-table/1", "title": study.title, "versions": stated_versions()}
     write_table(table, folder / TABLE, meanings, about)
-    told = {name: [row.provenance.get(name) for row in rows] for name in TOLD}
+    recorded = {name: [row.provenance.get(name) for row in rows] for name in TOLD}
     detail = [row.provenance.get("detail", "") for row in rows]
-    provenance = {"point": table["point"], "case": table["case"], **told, "detail": detail}
+    provenance = {"point": table["point"], "case": table["case"], **recorded, "detail": detail}
     provenance["versions"] = [stated_versions()] * len(rows)
     units = {name: {"unit": unit} for name, unit in PROVENANCE_UNITS.items()}
     write_table(provenance, folder / PROVENANCE, units, {**about, "format": "rollover-study-provenance/1"})

@@ -68,12 +68,11 @@ def _words(column: NDArray[Any], failed: NDArray[np.bool_]) -> dict[str, Any]:
 
 def sentence(rows: Sequence[Mapping[str, Any]]) -> str:
     """Along which axes the failed cases are not at random, in words; empty where no test says so."""
-    told = [f"{_share(row)} (p = {row['p']:.2g}, {row['test']})" for row in rows if row["differs"]]
-    if not told:
+    sentences = [f"{_share(row)} (p = {row['p']:.2g}, {row['test']})" for row in rows if row["differs"]]
+    if not sentences:
         return ""
-    return (
-        f"Failures are not at random: they are more frequent {'; '.join(told)}; the cases that are done are a selection"
-    )
+    where = "; ".join(sentences)
+    return f"Failures are not at random: they are more frequent {where}; the cases that are done are a selection"
 
 
 def _share(row: Mapping[str, Any]) -> str:

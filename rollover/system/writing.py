@@ -287,9 +287,9 @@ def _locked(path: Path, target: Path) -> Iterator[None]:
     while again:  # whoever had it may have removed it just now
         handle = os.open(path, flags, 0o644)
         if not _taken(handle):
-            told = os.read(handle, 20).decode("ascii", "replace").strip()
+            owner = os.read(handle, 20).decode("ascii", "replace").strip()
             os.close(handle)
-            what = f"is being written by another process{f' {told}' if told.isdecimal() else ''}"
+            what = f"is being written by another process{f' {owner}' if owner.isdecimal() else ''}"
             raise InputError(Fault(file=str(target), message=f"{what}; wait for it, or another --out"))
         again = not path.exists() or not os.path.samestat(os.fstat(handle), path.stat())
         if again:

@@ -52,8 +52,8 @@ def chosen_rightly(
         for e in dataset:
             late = float(rng.normal(0.0, CLOCK))
             raw = e.raw(e.simulator.predict(Problem.changes([one], x), late) or {})
-            assert e.doubts is not None
-            raw = raw + e.doubts @ rng.standard_normal(e.doubts.shape[1])
+            assert e.nuisance is not None
+            raw = raw + e.nuisance @ rng.standard_normal(e.nuisance.shape[1])
             raw = raw + np.concatenate([rng.normal(0.0, s.sigma, s.rows.size) for s in e.signals])
             noisy.append(showing(e, raw))
             clocks.append(late)

@@ -15,7 +15,7 @@ from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
-from rollover.diagnosis.noise.autoregression import Rest, loudness_ratio, rests, with_noise_of_quiet_stretches
+from rollover.diagnosis.noise.autoregression import Rest, level_ratio, rests, with_noise_of_quiet_stretches
 from rollover.recording import Recording
 from rollover.recording.filters import filtered
 from tests.diagnosis.drops import recorded as dropped
@@ -113,7 +113,7 @@ def short(random: np.random.Generator, levels: Sequence[float], n: int = 110) ->
 
 
 def test_short_recordings_of_one_level_are_told_to_be_alike() -> None:
-    found = [loudness_ratio(r, r) for r in (short(np.random.default_rng(k), (2.0,) * 4) for k in range(400))]
+    found = [level_ratio(r, r) for r in (short(np.random.default_rng(k), (2.0,) * 4) for k in range(400))]
     assert sum(bool(np.any(sizes != 1.0)) for sizes in found) <= 1  # one in ten thousand by chance
 
 
@@ -123,7 +123,7 @@ def test_gains_set_for_each_test_show_in_few_samples() -> None:
     random, told = np.random.default_rng(3), []
     for _ in range(50):
         noisy = short(random, (1.0, 2.0, 4.0))
-        told.append(loudness_ratio(noisy, [pulse + v for v in noisy]))
+        told.append(level_ratio(noisy, [pulse + v for v in noisy]))
     # of 50 draws, each told to 1.6/sqrt(110): 5 % is 2.3 standard errors
     assert np.mean(told, axis=0) == pytest.approx([0.5, 1.0, 2.0], rel=0.05)
 

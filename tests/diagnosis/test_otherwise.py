@@ -78,7 +78,7 @@ def test_a_discontinuous_effect_is_scanned_not_linearised() -> None:
     assert not is_far(problem, base)  # from there all places are looked at
     c = next(c for c in candidates_of(problem.dataset, (), "drop") if c.id == "soil-adhesion")
     led = replace(c, id="soil-crust")  # any that is not
-    assert (c.is_sudden, led.is_sudden) == (True, False)
+    assert (c.is_discontinuous, led.is_discontinuous) == (True, False)
     looked = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={}, starts={c.key: ((0.01,),)})
     inquiry = Inquiry(
         problem=problem, candidates=(c,), groups=[[0], [1]], phases=[], say=lambda _: None, executor=Executor()

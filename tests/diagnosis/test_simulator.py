@@ -130,9 +130,9 @@ def test_drops_share_what_their_conditions_leave_as_it_is() -> None:
     assert [s.initiation.speed for s in made if isinstance(s.initiation, Drop)] == [1.3, 2.2]
     assert made[0].ground is made[1].ground is own.ground
     layer = {"effects.soil-layer.depth": 0.1}
-    one, other = (DropModel(scenario=s).with_(layer).told[1] for s in made)
+    one, other = (DropModel(scenario=s).with_(layer).kernel_law[1] for s in made)
     assert one is other
-    assert one.tolist() != DropModel(scenario=own).told[1].tolist()
+    assert one.tolist() != DropModel(scenario=own).kernel_law[1].tolist()
 
 
 def test_a_clock_of_its_own_is_simulated_at_its_own_stamps() -> None:

@@ -68,7 +68,7 @@ def test_what_does_not_count_gives_the_same_bits() -> None:
         "effects.air-drag.area": 0.4,
     }
     model = DropModel(scenario=load("drop_test")).with_(changes)
-    law, p = model.told
+    law, p = model.kernel_law
     counting, force = counted(accelerate), counted(normal_force)
     draw = np.random.default_rng(7)
     s, state, row = np.array([3.0, 132.0, np.inf, 7e4, 3e5]), np.zeros(STATE_COLUMNS, np.int64), np.zeros(COLUMNS)

@@ -66,12 +66,12 @@ def test_another_form_of_yield_is_written_into_the_mounts() -> None:
         different = len({float(s) for s in slopes if np.sum(slopes == s) > 3})
         rate = tractor.rops.mounts[0].rate_factor
         if change.form == "hardening":
-            assert slopes[-1] == pytest.approx(2.0 * change.told["tangent"], abs=1e-3)
+            assert slopes[-1] == pytest.approx(2.0 * change.parameters["tangent"], abs=1e-3)
         elif change.form == "one-by-one":
-            assert (different, max(force)) == (3, pytest.approx(change.told["yield_force"]))
+            assert (different, max(force)) == (3, pytest.approx(change.parameters["yield_force"]))
         else:
             assert rate is not None
-            assert (rate.rate, rate.exponent, rate.gauge_length) == (40.4, 5.0, change.told["gauge_length"])
+            assert (rate.rate, rate.exponent, rate.gauge_length) == (40.4, 5.0, change.parameters["gauge_length"])
     order = Order(index=0, seed=5, kind="foreign-form", ids=("rops-plasticity",))
     (effect,) = make(order).truth["effects"]
     assert effect["form"] in ("hardening", "by-rate", "one-by-one")
@@ -98,7 +98,7 @@ def test_every_effect_acts_in_overturns_by_its_parameters() -> None:
         assert change.id == id
         assert change.kind == kind.kind
         assert "rollover" in kind.acts
-        for name, value in change.told.items():
+        for name, value in change.parameters.items():
             if id != "sensor-bias":  # searched over the channel's range
                 assert kind.search[name].low <= value <= kind.search[name].high, (id, name)
 

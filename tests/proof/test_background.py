@@ -101,15 +101,15 @@ def test_drops_share_a_part_of_it(plain: list[Descent]) -> None:
 def test_the_truth_states_it_and_a_seed_repeats_it() -> None:
     order = Order(index=2, seed=31, kind="background", background=0.04)
     case = make(order)
-    told = case.truth["background"]
+    sealed = case.truth["background"]
     assert (case.truth["kind"], case.truth["verdict"], case.truth["effects"]) == ("background", "no-mismatch", [])
-    assert told["share"] == 0.04
-    assert told["channels"][FORCE]["rms"] == pytest.approx(0.04, rel=0.15)
+    assert sealed["share"] == 0.04
+    assert sealed["channels"][FORCE]["rms"] == pytest.approx(0.04, rel=0.15)
     assert json.dumps(case.truth) == json.dumps(make(order).truth)
     for two, again in zip(case.recordings, make(order).recordings, strict=True):
         np.testing.assert_array_equal(two[FORCE], again[FORCE])
     other = make(replace(order, seed=32)).truth["background"]
-    assert other["frame"] != told["frame"]
+    assert other["frame"] != sealed["frame"]
 
 
 def test_a_case_with_a_background_is_that_case_and_a_background() -> None:

@@ -77,7 +77,7 @@ def test_foreign_forms_take_turns_and_unknown_ones_are_refused() -> None:
             plan(4, 5, [kind], [effect])
 
 
-# What the ground presses with on the way down, written from the docstrings: (told, z, v, F of the plain ground) -> N
+# What the ground presses with on the way down, from the docstrings: (parameters, z, v, F of the plain ground) -> N
 LAWS: dict[str, Callable[[Mapping[str, float], float, float, float], float]] = {
     "hunt-crossley": lambda p, z, v, f: f + p["chi"] * z**1.5 * v,
     "kelvin-voigt-with-cut-off": lambda p, z, v, f: f + p["most"] * float(np.clip(v / p["speed"], -1.0, 1.0)),
@@ -150,10 +150,10 @@ BRAKES: dict[str, Callable[[Mapping[str, float], float], float]] = {
 }
 
 
-def brake(id: str, form: Form, told: Mapping[str, float], v: float) -> float:
+def brake(id: str, form: Form, parameters: Mapping[str, float], v: float) -> float:
     if id == "air-drag":
-        return math.copysign(told["factor"] * abs(v) ** told["power"], v)
-    return BRAKES[form.name](told, v) if id == "guide-friction" else 0.0
+        return math.copysign(parameters["factor"] * abs(v) ** parameters["power"], v)
+    return BRAKES[form.name](parameters, v) if id == "guide-friction" else 0.0
 
 
 def on_the_way(drop: Descent, mode: str = LOADING) -> list[float]:
@@ -173,7 +173,7 @@ BLOCKS = [(id, form) for id, form in BLOCKS if id != "structural-compliance"]
 def test_mass_times_acceleration_is_the_sum_of_the_forces(id: str, form: Form) -> None:
     """M a + d(m_b1 v)/dt = m g - brake - F, accelerations as second differences of the position."""
     # soil that joins is heavy enough to show what it takes along
-    change = next(c for c in (drawn(id, form, seed) for seed in range(3, 60)) if c.told.get("mass", 9.0) > 5.0)
+    change = next(c for c in (drawn(id, form, seed) for seed in range(3, 60)) if c.parameters.get("mass", 9.0) > 5.0)
     drop = dropped(change)
     plain = loading_curve(Rig(), SHOT.speed)
     joins = JOINS.get(form.name, lambda p, z: 0.0) if "mass" in id else lambda p, z: 0.0
@@ -182,17 +182,19 @@ def test_mass_times_acceleration_is_the_sum_of_the_forces(id: str, form: Form) -
     for t in on_the_way(drop):
         z = -drop.channels(t + h * np.arange(-1.0, 2.0))[PLACE]
         v, a = (z[2] - z[0]) / (2.0 * h), (z[2] - 2.0 * z[1] + z[0]) / h**2
-        grown = (joins(change.told, z[2]) - joins(change.told, z[0])) / (z[2] - z[0])
-        total = 132.0 + 13.2 + joins(change.told, z[1])
+        grown = (joins(change.parameters, z[2]) - joins(change.parameters, z[0])) / (z[2] - z[0])
+        total = 132.0 + 13.2 + joins(change.parameters, z[1])
         law = LAWS.get(form.name) if "air" not in id else None
-        presses = law(change.told, z[1], v, plain(0.0, z[1], 0.0)) if law else plain(0.0, z[1], 0.0)
-        forces = 132.0 * 9.81 - brake(id, form, change.told, v) - presses
+        presses = law(change.parameters, z[1], v, plain(0.0, z[1], 0.0)) if law else plain(0.0, z[1], 0.0)
+        forces = 132.0 * 9.81 - brake(id, form, change.parameters, v) - presses
         # second differences of 1e-11 m over 20 us, and their own curvature
         assert total * a + grown * v * v == pytest.approx(forces, abs=4.0 + 2e-3 * abs(forces)), t
-        told = drop.channels(np.array([t]))
-        assert told[ACCELERATION][0] == pytest.approx(-a, abs=0.03)
-        cell = told[FORCE][0]
-        assert cell == pytest.approx(132.0 * (9.81 - a) - brake(id, form, change.told, v), abs=4.0 + 2e-3 * abs(cell))
+        parameters = drop.channels(np.array([t]))
+        assert parameters[ACCELERATION][0] == pytest.approx(-a, abs=0.03)
+        cell = parameters[FORCE][0]
+        assert cell == pytest.approx(
+            132.0 * (9.81 - a) - brake(id, form, change.parameters, v), abs=4.0 + 2e-3 * abs(cell)
+        )
         checked += 1
     assert checked >= 15
 
@@ -200,7 +202,7 @@ def test_mass_times_acceleration_is_the_sum_of_the_forces(id: str, form: Form) -
 def test_bristles_stick_at_rest_and_slip_at_the_speeds_level() -> None:
     form = next(f for f in foreign.FORMS["guide-friction"] if f.name == "lugre")
     change = drawn("guide-friction", form, 3)
-    p, drop = change.told, dropped(change)
+    p, drop = change.parameters, dropped(change)
     before = drop.channels(np.linspace(-0.05, -0.001, 50))
     speed = -before[SPEED]
     level = p["kinetic"] + (p["static"] - p["kinetic"]) * np.exp(-((speed / p["speed"]) ** 2)) + p["viscous"] * speed
@@ -223,7 +225,7 @@ def test_a_joint_passes_on_what_the_body_is_braked_with(form: Form) -> None:
         "dry-joint": lambda p, u, w: p["linear"] * u + p["friction"] * math.tanh(100.0 * w),
     }
     change = drawn("structural-compliance", form, 2)
-    drop, p = dropped(change), change.told
+    drop, p = dropped(change), change.parameters
     body = 132.0 * (1.0 - p["nose"])
     for t in on_the_way(drop)[:60]:
         stage = next(s for s in drop.stages if s.start <= t <= s.end)
@@ -292,7 +294,7 @@ def test_no_ground_form_is_the_products_own(id: str, form: Form) -> None:
     left = []
     for seed in range(5):
         change = drawn(id, form, seed)
-        ours = np.array([LAWS[form.name](change.told, *at) for at in zip(Z, V, F, strict=True)]) - F
+        ours = np.array([LAWS[form.name](change.parameters, *at) for at in zip(Z, V, F, strict=True)]) - F
         left.append(min(apart(ours, own, starts) for own, starts in OWN[id]))
     assert np.median(left) > LEAST, left
 
@@ -307,7 +309,7 @@ def test_ways_back_are_bent() -> None:
         drop = dropped(change)
         line = next(s.line for s in drop.stages if s.line is not None)
         deep = drop.deepest()[1]
-        assert line.rut == pytest.approx(deep * (1.0 - change.told["recovery"]), rel=1e-6)
+        assert line.rut == pytest.approx(deep * (1.0 - change.parameters["recovery"]), rel=1e-6)
         half = line.rut + 0.5 * (line.depth - line.rut)
         assert line.presses(drop.rig, half, 0.0) == pytest.approx(line.force * shape(0.5))
 
@@ -323,7 +325,9 @@ def test_pulls_are_bent() -> None:
             for at in np.linspace(stage.start, stage.end, 400):
                 x_, p, *_ = stage.state(at).tolist()
                 pulled = min(pulled, stage.ground(at, x_, p / (drop.rig.nose + stage.moving(x_)), 0.0))
-        assert -1.35 * change.told["stress"] * FACE < pulled < -0.3 * change.told["stress"] * FACE, form.name
+        assert -1.35 * change.parameters["stress"] * FACE < pulled < -0.3 * change.parameters["stress"] * FACE, (
+            form.name
+        )
         held = change.rig["holding"]
         assert max(abs(held(at) - (1.0 - at)) for at in x[:-1]) > 0.1, form.name
 
@@ -372,7 +376,7 @@ def test_a_two_way_dashpot_brakes_unloading_and_never_pulls() -> None:
             line = stage.line
             assert line is not None
             straight = min(line.force - line.stiffness * (line.depth - z[1]) + line.dashpot * v, line.force)
-            presses = max(LAWS[name](change.told, z[1], v, max(straight, 0.0)), 0.0)
+            presses = max(LAWS[name](change.parameters, z[1], v, max(straight, 0.0)), 0.0)
             assert (132.0 + stage.moving(z[1])) * a == pytest.approx(132.0 * 9.81 - presses, abs=4.0 + 2e-3 * presses)
             lowest = min(lowest, presses - straight)
         assert lowest < -5.0, "on the way back it takes from the line"

@@ -92,8 +92,8 @@ def test_cases_without_either_have_no_such_part() -> None:
     ],
 )
 def test_a_share_that_is_explained(said_so: dict[str, Any], read: tuple[float, float | None]) -> None:
-    told = truth(effect(), kind="single") | BEHIND | {"explains": 0.75}
-    row = score(told, {"verdict": "missing-physics", "effects": [{"id": "soil-viscous-damping", **said_so}]})
+    sealed = truth(effect(), kind="single") | BEHIND | {"explains": 0.75}
+    row = score(sealed, {"verdict": "missing-physics", "effects": [{"id": "soil-viscous-damping", **said_so}]})
     assert (row["explained"]["share"], row["explained"]["low"]) == read
     explained = tally([row])["real"]["explained"]
     assert explained["error"] == pytest.approx(0.05)

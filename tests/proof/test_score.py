@@ -20,8 +20,15 @@ def effect(id: str = "soil-viscous-damping", kind: str = "physics", **more: Any)
         {"recording": 1, "channel": FORCE, "start": 0.02, "end": 0.2, "share": 0.08},
         {"recording": 1, "channel": DEPTH, "start": 0.1, "end": 0.3, "share": 0.02},
     ]
-    told = {"id": id, "kind": kind, "parameters": {"damping": 1000.0}, "channel": "", "depends_on": "speed", "near": []}
-    return {**told, "over_noise": 3.0, "signal_to_noise": 40.0, "where": cells, **more}
+    sealed = {
+        "id": id,
+        "kind": kind,
+        "parameters": {"damping": 1000.0},
+        "channel": "",
+        "depends_on": "speed",
+        "near": [],
+    }
+    return {**sealed, "over_noise": 3.0, "signal_to_noise": 40.0, "where": cells, **more}
 
 
 def truth(*effects: dict[str, Any], kind: str = "single", verdict: str = "missing-physics") -> dict[str, Any]:
@@ -84,11 +91,11 @@ def test_in_the_set_but_not_first() -> None:
 
 
 def test_a_sensor_is_right_on_its_channel_only() -> None:
-    told = truth(effect("sensor-gain", "sensor", channel=FORCE), verdict="sensor")
+    sealed = truth(effect("sensor-gain", "sensor", channel=FORCE), verdict="sensor")
     named = {"id": "sensor-gain", "parameters": {"channel": {"value": DEPTH}}}
-    assert score(told, {"verdict": "sensor", "effects": [named]})["first"] is False
+    assert score(sealed, {"verdict": "sensor", "effects": [named]})["first"] is False
     named = {"id": "sensor-gain", "channel": FORCE}
-    assert score(told, {"verdict": "sensor", "effects": [named]})["first"] is True
+    assert score(sealed, {"verdict": "sensor", "effects": [named]})["first"] is True
 
 
 def test_nothing_and_false_alarms() -> None:
@@ -104,27 +111,27 @@ def test_nothing_and_false_alarms() -> None:
 
 def test_two_effects() -> None:
     weak = effect("sensor-bias", "sensor", signal_to_noise=5.0, channel=FORCE)
-    told = truth(weak, effect(), kind="pair")
-    assert score(told, said("soil-viscous-damping", "sensor-bias"))["both"] is True
-    row = score(told, said("soil-viscous-damping"))
+    sealed = truth(weak, effect(), kind="pair")
+    assert score(sealed, said("soil-viscous-damping", "sensor-bias"))["both"] is True
+    row = score(sealed, said("soil-viscous-damping"))
     assert (row["first"], row["both"], row["both_in_sets"]) == (True, False, False)
-    assert score(told, said("sensor-bias", "soil-viscous-damping"))["first"] is False
+    assert score(sealed, said("sensor-bias", "soil-viscous-damping"))["first"] is False
 
 
 def test_what_is_in_no_library() -> None:
     bands = effect("outside:bands", "outside", depends_on="depth", near=["soil-layer"])
-    told = truth(bands, kind="outside", verdict="unexplained")
+    sealed = truth(bands, kind="outside", verdict="unexplained")
     fine = said(verdict="unexplained", where=[{"channel": FORCE, "depends_on": "ground/sinkage"}])
-    row = score(told, fine)
+    row = score(sealed, fine)
     assert (row["claim"], row["dependence_right"], row["verdict_right"]) == ("unexplained", True, True)
-    assert score(told, said(verdict="unexplained"))["dependence_right"] is False
+    assert score(sealed, said(verdict="unexplained"))["dependence_right"] is False
     flat = truth(effect("outside:flat-tyre", "outside", depends_on="attitude"), kind="outside", verdict="unexplained")
     for quantity, right in (("axle/front/angle", True), ("chassis/roll", True), ("chassis/angular_velocity_x", False)):
         there = [{"channel": "chassis/angular_velocity_z", "depends_on": quantity}]
         assert score(flat, said(verdict="unexplained", where=there))["dependence_right"] is right
-    assert score(told, said("soil-layer"))["claim"] == "near"
-    assert score(told, said("mass", remaining={"significant": True}))["claim"] == "wrong, rest unexplained"
-    assert score(told, said(verdict="no-mismatch"))["claim"] == "missed"
+    assert score(sealed, said("soil-layer"))["claim"] == "near"
+    assert score(sealed, said("mass", remaining={"significant": True}))["claim"] == "wrong, rest unexplained"
+    assert score(sealed, said(verdict="no-mismatch"))["claim"] == "missed"
 
 
 def test_exact_binomial_interval() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rollover.diagnosis import Diagnosis
-from rollover.diagnosis.overlay import Told, Track
+from rollover.diagnosis.overlay import Overlay, Track
 from rollover.diagnosis.result import Considered, Interval, Named, Place, Score
 
 FORCE = "ground/force_normal"
@@ -84,7 +84,7 @@ def nothing_found() -> Diagnosis:
     )
 
 
-def told(*, with_after: bool = True) -> tuple[Told, ...]:
+def overlays(*, with_after: bool = True) -> tuple[Overlay, ...]:
     """Two recordings over time, the second held out, with a gap; `before` is 8 % too low."""
     t = np.concatenate([np.arange(-0.02, 0.1, 1e-3), np.arange(0.12, 0.2, 1e-3)])
     force = 3000.0 * np.clip(t, 0.0, None) / 0.2
@@ -94,7 +94,7 @@ def told(*, with_after: bool = True) -> tuple[Told, ...]:
     )
     phases = ((-0.02, "free-fall"), (0.0, "first-contact"), (0.005, "loading"))
 
-    def one(name: str, held_out: bool) -> Told:
-        return Told(recording=name, title=name, held_out=held_out, phases=phases, shift=2e-5, tracks=(track,))
+    def one(name: str, held_out: bool) -> Overlay:
+        return Overlay(recording=name, title=name, held_out=held_out, phases=phases, shift=2e-5, tracks=(track,))
 
     return (one("one", False), one("two", True))

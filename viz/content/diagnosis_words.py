@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rollover.diagnosis import Diagnosis
-from rollover.diagnosis.overlay import Told, Track
+from rollover.diagnosis.overlay import Overlay, Track
 from rollover.spec.channels import is_known
 from viz.content.blocks import State
 from viz.content.entities import series
@@ -81,14 +81,14 @@ def markdown(found: Diagnosis) -> str:
     return "\n".join(lines)
 
 
-def ranked(found: Diagnosis, told: Sequence[Told]) -> list[tuple[Told, list[Track]]]:
+def ranked(found: Diagnosis, overlays: Sequence[Overlay]) -> list[tuple[Overlay, list[Track]]]:
     """Recordings and their channels by share of the misfit, the largest first; where there is none, as they came."""
     share: dict[tuple[str, str], float] = {}
     for p in found.where:
         share[p.recording, p.channel] = share.get((p.recording, p.channel), 0.0) + p.share
 
-    def tracks(one: Told) -> list[Track]:
+    def tracks(one: Overlay) -> list[Track]:
         return sorted(one.tracks, key=lambda t: -share.get((one.recording, t.channel), 0.0))
 
-    total = {t.recording: sum(s for (name, _), s in share.items() if name == t.recording) for t in told}
-    return [(one, tracks(one)) for one in sorted(told, key=lambda t: -total[t.recording])]
+    total = {t.recording: sum(s for (name, _), s in share.items() if name == t.recording) for t in overlays}
+    return [(one, tracks(one)) for one in sorted(overlays, key=lambda t: -total[t.recording])]

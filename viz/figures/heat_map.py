@@ -36,8 +36,8 @@ def heat_map(x: NDArray[Any], y: NDArray[Any], values: NDArray[np.float64], *, a
                 )  # fmt: skip
         for axis, levels in ((axes.xaxis, columns), (axes.yaxis, rows)):
             step = max(1, -(-len(levels) // 12))
-            told = [v if isinstance(v, str) else f"{v:.4g}" for v in levels]
-            axis.set_ticks([k + 0.5 for k in range(0, len(levels), step)], told[::step])
+            ticks = [v if isinstance(v, str) else f"{v:.4g}" for v in levels]
+            axis.set_ticks([k + 0.5 for k in range(0, len(levels), step)], ticks[::step])
         bar = figure.colorbar(mesh, ax=axes)
         bar.set_label(label, color=COLOURS["ink"])
         bar.outline.set_visible(False)

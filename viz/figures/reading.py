@@ -64,5 +64,5 @@ def readable(svg: str, figure: Any) -> str:
         )
     if not found:
         return svg
-    told = html.escape(json.dumps(found, separators=(",", ":")), quote=True)
-    return svg.replace('<svg role="img"', f'<svg role="img" data-axes="{told}"', 1)
+    axes_data = html.escape(json.dumps(found, separators=(",", ":")), quote=True)
+    return svg.replace('<svg role="img"', f'<svg role="img" data-axes="{axes_data}"', 1)

@@ -46,26 +46,31 @@ def in_order(y: Array, label: str, levels: Sequence[Level], *, drawn: bool) -> F
 
 def responses(study: Study, done: Conducted, y: Array, label: str, levels: Sequence[Level]) -> list[Block]:
     """The output along each axis: points and their mean; of two axes' grid a curve for each level of the other."""
-    told = labels(study)
+    label_of = labels(study)
     numeric = [a.name for a in study.axes if done.points.columns[a.name].dtype != object][:MOST_AXES]
     found: list[Block] = []
     if len(study.axes) == 2 and study.plan.kind == "grid":
         first, second = (axis.name for axis in study.axes)
         svg = heat_map(
-            done.points.columns[first], done.points.columns[second], y, across=told[first], up=told[second], label=label
+            done.points.columns[first],
+            done.points.columns[second],
+            y,
+            across=label_of[first],
+            up=label_of[second],
+            label=label,
         )
         found.append(Figure(svg=svg, caption=f"{label} over both axes; a cross is a case without it."))
         for name, other in ((first, second), (second, first)):
             if name in numeric:
-                svg = plots.xy(_curves(done, y, name, other), across=told[name], label=label, levels=levels)
-                found.append(Figure(svg=svg, caption=f"Along {name}, a curve for each {told[other]}."))
+                svg = plots.xy(_curves(done, y, name, other), across=label_of[name], label=label, levels=levels)
+                found.append(Figure(svg=svg, caption=f"Along {name}, a curve for each {label_of[other]}."))
         return found
     for name in numeric:
         x = np.asarray(done.points.columns[name], dtype=float)
         good = np.isfinite(y)
         kept = _thinned(x[good], y[good])
         points = Curve(name="cases", x=x[good][kept], y=y[good][kept], role="muted")
-        svg = plots.scatter([points], across=told[name], label=label, line=_mean(x[good], y[good]), levels=levels)
+        svg = plots.scatter([points], across=label_of[name], label=label, line=_mean(x[good], y[good]), levels=levels)
         whole = int(good.sum())
         count = f"{len(kept)} of {whole} cases, the extremes among them" if len(kept) < whole else "All cases"
         found.append(Figure(svg=svg, caption=f"{count}; the line is the mean of parts of equal count."))

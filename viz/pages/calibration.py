@@ -167,10 +167,10 @@ def _posterior(c: Calibration, drawn: Posterior) -> list[Block]:
     rows: list[list[str | Cell]] = []
     for k, p in enumerate(c.parameters):
         low, median, high = np.quantile(values[:, k], [0.025, 0.5, 0.975])
-        told = (values[:, k].mean(), values[:, k].std(ddof=1), low, median, high)
+        numbers = (values[:, k].mean(), values[:, k].std(ddof=1), low, median, high)
         each = drawn.r_hat[k], drawn.autocorrelation[k], drawn.effective[k]
         agree = Cell(f"{each[0]:.3f}", "" if drawn.is_mixed else "warn")
-        rows.append([p.path, *(f"{v:.5g}" for v in told), agree, f"{each[1]:.2g}", f"{each[2]:.0f}"])
+        rows.append([p.path, *(f"{v:.5g}" for v in numbers), agree, f"{each[1]:.2g}", f"{each[2]:.0f}"])
     text = (
         f"{len(values)} draws by {drawn.sampler}: {drawn.walkers} walkers, {drawn.steps} steps after {drawn.warm_up}, "
         f"{drawn.acceptance:.0%} of the jumps accepted. Prior: uniform between the bounds, of the logarithm where they "

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from rollover.diagnosis import Diagnosis
-from rollover.diagnosis.overlay import Told, Track
+from rollover.diagnosis.overlay import Overlay, Track
 from rollover.diagnosis.result import Place, Score
 from rollover.effects import effects
 from rollover.recording.checks import Finding
@@ -28,7 +28,7 @@ Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]  # what a 
 
 def page(
     found: Diagnosis,
-    told: Sequence[Told],
+    overlays: Sequence[Overlay],
     *,
     title: str,
     scenario: Scenario | None = None,
@@ -38,17 +38,17 @@ def page(
     versions: Mapping[str, str] | None = None,
     each: Each = map,
 ) -> str:
-    """HTML of a diagnosis; `told` are its recordings over time, `prechecks` (recording, finding); `each` draws."""
+    """HTML of a diagnosis; `overlays` are its recordings over time, `prechecks` (recording, finding); `each` draws."""
     blocks = [
         *(differences_section(scenario) if scenario is not None else []),
         *_found(found),
-        *_where(found, told, each),
-        *_followed(found, told, each),
+        *_where(found, overlays, each),
+        *_followed(found, overlays, each),
         *_next(found),
         *_considered(found),
         *_detectable(found),
-        _sensors(prechecks, len(told)),
-        _basis(found, told),
+        _sensors(prechecks, len(overlays)),
+        _basis(found, overlays),
     ]
     return render(
         title=title,
@@ -80,10 +80,10 @@ def _found(found: Diagnosis) -> list[Block]:
     return [Section(title="What was found", blocks=[*notes, table])]
 
 
-def _where(found: Diagnosis, told: Sequence[Told], each: Each) -> list[Block]:
+def _where(found: Diagnosis, overlays: Sequence[Overlay], each: Each) -> list[Block]:
     """Pictures of the recordings with the largest share, and the table of shares."""
-    foretold = _foretold(told)
-    by_share = ranked(found, [one for one in told if one is not foretold])
+    predicted = _predicted(overlays)
+    by_share = ranked(found, [one for one in overlays if one is not predicted])
     front = by_share[: PICTURES if found.where else 1]
     shown = [(one, t) for one, tracks in front for t in tracks[:2]]
     folded = [(one, t) for k, (one, tracks) in enumerate(by_share) for t in tracks[2 * (k < len(front)) :]]
@@ -113,17 +113,17 @@ def _where(found: Diagnosis, told: Sequence[Told], each: Each) -> list[Block]:
     return [Section(title=title, blocks=blocks)] if blocks else []
 
 
-def _foretold(told: Sequence[Told]) -> Told | None:
-    """The recording that was kept from every fit and is foretold: of several, the one that the scenario misses most."""
-    kept = [one for one in told if one.held_out and any(t.rms_after is not None for t in one.tracks)]
+def _predicted(overlays: Sequence[Overlay]) -> Overlay | None:
+    """The recording that no fit has seen and that is predicted: of several, the one that the scenario misses most."""
+    kept = [one for one in overlays if one.held_out and any(t.rms_after is not None for t in one.tracks)]
     return max(kept, key=lambda one: max(t.rms_before for t in one.tracks), default=None)
 
 
-def _figures(drawn: Sequence[tuple[Told, Track]], simulated: str, each: Each) -> list[Figure]:
+def _figures(drawn: Sequence[tuple[Overlay, Track]], simulated: str, each: Each) -> list[Figure]:
     return list(each(_figure, [(replace(one, tracks=(t,)), simulated) for one, t in drawn]))
 
 
-def _figure(drawn: tuple[Told, str]) -> Figure:
+def _figure(drawn: tuple[Overlay, str]) -> Figure:
     """A recording's one track, with what the scenario as it is goes by."""
     one, simulated = drawn
     (track,) = one.tracks
@@ -167,7 +167,7 @@ def _places(places: Sequence[Place], caption: str) -> Table:
     return Table(columns=columns, rows=rows, numeric=(3, 4, 5), caption=caption)
 
 
-def _followed(found: Diagnosis, told: Sequence[Told], each: Each) -> list[Block]:
+def _followed(found: Diagnosis, overlays: Sequence[Overlay], each: Each) -> list[Block]:
     """Before and after: training and held-out apart, then each recording, then what no fit had seen as a picture."""
     rows: list[Row] = []
     for title, which, names in (
@@ -181,7 +181,7 @@ def _followed(found: Diagnosis, told: Sequence[Told], each: Each) -> list[Block]
         return []
     in_turn = set(found.training) == set(found.held_out)
     how = "Held out: the misfit is predicted from a fit to the others; rating and peak are of the fit to all."
-    if in_turn and len({t.condition or t.recording for t in told}) < 2:
+    if in_turn and len({t.condition or t.recording for t in overlays}) < 2:
         how = "All recordings share one condition: nothing could be held out, and all numbers are of the fit."
     heads = ["", "recordings", "", "misfit / noise", "ISO/TS 18571", "peak force error, %"]
     blocks: list[Block] = [Table(columns=heads, rows=rows, numeric=(3, 4, 5), caption=how)]
@@ -189,10 +189,10 @@ def _followed(found: Diagnosis, told: Sequence[Told], each: Each) -> list[Block]
     columns = ["recording", "predicted as", "before", "after"]
     caption = "Misfit over the noise of each recording; 1 is the noise itself."
     blocks.append(Table(columns=columns, rows=per, numeric=(2, 3), caption=caption))
-    foretold = _foretold(told)
-    if foretold is not None:
-        tracks = sorted(foretold.tracks, key=lambda t: -t.rms_before)
-        blocks.extend(_figures([(foretold, t) for t in tracks], "before", each))
+    predicted = _predicted(overlays)
+    if predicted is not None:
+        tracks = sorted(predicted.tracks, key=lambda t: -t.rms_before)
+        blocks.extend(_figures([(predicted, t) for t in tracks], "before", each))
     return [Section(title="How well the recordings are followed", blocks=blocks)]
 
 
@@ -279,13 +279,13 @@ def _sensors(prechecks: Sequence[tuple[str, Finding]], count: int) -> Section:
     return Section(title="Sensors, before any model", blocks=[note, Table(columns=columns, rows=rows, numeric=(3, 4))])
 
 
-def _basis(found: Diagnosis, told: Sequence[Told]) -> Section:
+def _basis(found: Diagnosis, overlays: Sequence[Overlay]) -> Section:
     """Noise, time shifts, size of the work, and what else is to be known."""
     noise: list[Row] = []
     for channel, sigma in found.noise.items():
         s = series(channel)
         noise.append([channel, _g(sigma * s.factor, 3), s.unit])
-    shifts: list[Row] = [[t.recording, f"{1e3 * t.shift:+.3f}"] for t in told]
+    shifts: list[Row] = [[t.recording, f"{1e3 * t.shift:+.3f}"] for t in overlays]
     blocks: list[Block] = [
         Note(text=f"Noise alone leaves such a misfit with {_chance(found.p_value)}."),
         Table(columns=["channel", "noise, 1 sigma", "unit"], rows=noise, numeric=(1,)),

@@ -135,8 +135,8 @@ def _tornado(output: Mapping[str, Any], factor: float, label: str) -> Figure:
         centre=output["mean"] * factor,
         label=label,
     )
-    told = "; ".join(f"{e['axis']} {_end(e['at_low'])} to {_end(e['at_high'])}" for e in ends)
-    caption = f"Mean over the lowest and the highest fifth of each axis ({told}), about the mean of all."
+    ends_by_axis = "; ".join(f"{e['axis']} {_end(e['at_low'])} to {_end(e['at_high'])}" for e in ends)
+    caption = f"Mean over the lowest and the highest fifth of each axis ({ends_by_axis}), about the mean of all."
     return Figure(svg=svg, caption=caption)
 
 
@@ -228,8 +228,8 @@ def _failures(account: Mapping[str, Any]) -> Section:
             for t in tests
         ]
         heads = ("axis", "failed cases", "cases done", "failures more frequent", "p", "test")
-        told = f"Failed against other cases, along each axis; level {100 * failures.LEVEL:g} % for all (Bonferroni)."
-        blocks.append(Table(columns=heads, rows=cells, numeric=(4,), caption=told))
+        caption = f"Failed against other cases, along each axis; level {100 * failures.LEVEL:g} % for all (Bonferroni)."
+        blocks.append(Table(columns=heads, rows=cells, numeric=(4,), caption=caption))
     return Section(title="Failures", blocks=blocks)
 
 
@@ -246,10 +246,10 @@ def _flags(account: Mapping[str, Any]) -> Section:
 def _cases(study: Study, done: Conducted) -> Cases:
     n = done.points.count
     columns: list[tuple[str, Sequence[Any]]] = [("point", list(range(n)))]
-    told = labels(study)
+    label_of = labels(study)
     for axis in study.axes:
         column = done.points.columns[axis.name]
-        columns.append((told[axis.name], [v if isinstance(v, str) else float(v) for v in column]))
+        columns.append((label_of[axis.name], [v if isinstance(v, str) else float(v) for v in column]))
     for name in dict.fromkeys(output.name for output in study.outputs):
         output = next(o for o in study.outputs if o.name == name)
         unit, factor = series_unit(output.unit)

@@ -11,7 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from rollover.diagnosis import Diagnosis
-from rollover.diagnosis.overlay import Told, Track
+from rollover.diagnosis.overlay import Overlay, Track
 from viz.content.diagnosis_words import answer, markdown, ranked
 from viz.content.entities import LIMIT, MEASURED, SIMULATED, escaped, series
 from viz.recordings.blueprint import framed
@@ -36,31 +36,31 @@ STACKED = 4  # channels that stand one above the other; more stand in two column
 _SOURCES = (("measured", MEASURED, 1.0), ("before", LIMIT, 1.5), ("after", SIMULATED, 4.0))
 
 
-def write_diagnosis(found: Diagnosis, told: Sequence[Told], path: Path, title: str) -> None:
+def write_diagnosis(found: Diagnosis, overlays: Sequence[Overlay], path: Path, title: str) -> None:
     """Write a diagnosis as a recording for the viewer, whole or not at all."""
-    rec = rr.RecordingStream("rollover diagnosis", recording_id=_id(found, told))
-    with saving(rec, path, _blueprint(found, told)):
+    rec = rr.RecordingStream("rollover diagnosis", recording_id=_id(found, overlays))
+    with saving(rec, path, _blueprint(found, overlays)):
         out = Stream(rec)
         out.static("answer", rr.TextDocument(markdown(found), media_type=rr.MediaType.MARKDOWN))
         rec.send_recording_name(f"{title}: {answer(found)}")
-        for one in told:
+        for one in overlays:
             _looks(out, one)
         out.settle()
-        for one in told:
+        for one in overlays:
             _recording(out, one)
 
 
-def _id(found: Diagnosis, told: Sequence[Told]) -> str:
-    return "-".join(["diagnosis", found.verdict, *(t.recording for t in told)])
+def _id(found: Diagnosis, overlays: Sequence[Overlay]) -> str:
+    return "-".join(["diagnosis", found.verdict, *(t.recording for t in overlays)])
 
 
-def _path(one: Told, track: Track, what: str) -> str:
+def _path(one: Overlay, track: Track, what: str) -> str:
     """Entity of a channel's curves or residuals: each recording has its own branch."""
     last = series(track.channel).path.rpartition("/")[2]
     return f"{escaped(one.recording)}/{what}/{last}"
 
 
-def _looks(out: Stream, one: Told) -> None:
+def _looks(out: Stream, one: Overlay) -> None:
     for track in one.tracks:
         s = series(track.channel)
         for source, shade, width in _SOURCES:
@@ -80,7 +80,7 @@ def _line(name: str, shade: int, width: float) -> Any:
     return rr.SeriesLines(names=[name], colors=colour(shade), widths=[width], aggregation_policy=policy)
 
 
-def _recording(out: Stream, one: Told) -> None:
+def _recording(out: Stream, one: Overlay) -> None:
     for track in one.tracks:
         factor = series(track.channel).factor
         for source, values in (("measured", track.measured), ("before", track.before), ("after", track.after)):
@@ -103,10 +103,10 @@ def _columns(out: Stream, path: str, time: np.ndarray[Any, Any], values: np.ndar
     out.columns(path, at, rr.Scalars.columns(scalars=np.insert(values, breaks, np.nan)))
 
 
-def _blueprint(found: Diagnosis, told: Sequence[Told]) -> rrb.Blueprint:
+def _blueprint(found: Diagnosis, overlays: Sequence[Overlay]) -> rrb.Blueprint:
     """First the answer beside the place where it shows most; then a tab for each recording."""
     words = rrb.TextDocumentView(origin="/answer", contents=["+ /answer"], name="Answer")
-    by_share = ranked(found, told)
+    by_share = ranked(found, overlays)
     front: Any = words
     if by_share and by_share[0][1]:
         one, tracks = by_share[0]
@@ -127,12 +127,12 @@ def _blueprint(found: Diagnosis, told: Sequence[Told]) -> rrb.Blueprint:
     return framed(rrb.Tabs(*tabs, active_tab=0))
 
 
-def _values(one: Told, track: Track) -> rrb.TimeSeriesView:
+def _values(one: Overlay, track: Track) -> rrb.TimeSeriesView:
     s = series(track.channel)
     return _plot(f"{one.recording}: {s.name}, {s.unit}", [_path(one, track, "values")])
 
 
-def _residual(one: Told, tracks: Sequence[Track]) -> rrb.TimeSeriesView:
+def _residual(one: Overlay, tracks: Sequence[Track]) -> rrb.TimeSeriesView:
     paths = [_path(one, t, "residual") for t in tracks]
     over = "over the noise" if all(t.scatter is None for t in tracks) else "over noise and scatter of runs"
     return _plot(f"{one.recording}: measured less simulated, {over}", paths)
@@ -148,6 +148,6 @@ def _plot(name: str, paths: Sequence[str]) -> rrb.TimeSeriesView:
     )
 
 
-def _phase(one: Told) -> rrb.StateTimelineView:
+def _phase(one: Overlay) -> rrb.StateTimelineView:
     root = f"/{escaped(one.recording)}/phase"
     return rrb.StateTimelineView(origin=root, contents=[f"+ {root}"], name="Phase")

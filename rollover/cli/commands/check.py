@@ -148,9 +148,9 @@ def _shared(rows: list[dict[str, Any]], read: dict[str, Recording]) -> None:
 
     by_name = {row["file"]: row for row in rows if row["is"] == "recording"}
     for name, f in shared_rails(read):
-        told = by_name[name]["findings"] if name in by_name else None
-        if told is not None and not any((t["check"], t["channel"]) == (f.check, f.channel) for t in told):
-            told.append(vars(f))
+        listed = by_name[name]["findings"] if name in by_name else None
+        if listed is not None and not any((t["check"], t["channel"]) == (f.check, f.channel) for t in listed):
+            listed.append(vars(f))
 
 
 def _print(name: str, row: dict[str, Any]) -> None:

@@ -15,7 +15,7 @@ from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from rollover.diagnosis import Diagnosis
-    from rollover.diagnosis.overlay import Told
+    from rollover.diagnosis.overlay import Overlay
     from rollover.recording import Recording
 
 MOST_TOLERATED = 0.5  # of a range: what may miss half of it is no model of it
@@ -168,17 +168,17 @@ def diagnose(
             say=console.say,
             executor=executor,
         )
-        told = series(chosen, list(measured.items()), found, executor.children)
+        overlays = series(chosen, list(measured.items()), found, executor.children)
         answer = account(found, about, plain(findings))
         with results.whole(folder) as part, ThreadPoolExecutor(1) as beside:
             results.write_json(part / JSON, answer)
             (part / SCENARIO).write_text(diagnosed_text(chosen, found), encoding="utf-8")
-            drawn = beside.submit(_draw, found, told, part / PICTURE, chosen.title)
+            drawn = beside.submit(_draw, found, overlays, part / PICTURE, chosen.title)
             from viz.pages.diagnosis import page
 
             text = page(
                 found,
-                told,
+                overlays,
                 title=chosen.title,
                 scenario=chosen,
                 prechecks=findings,
@@ -308,7 +308,7 @@ def _options(
     return [part for name, texts in given for text in texts for part in (name, text)]
 
 
-def _draw(found: Diagnosis, told: Sequence[Told], path: Path, title: str) -> None:
+def _draw(found: Diagnosis, overlays: Sequence[Overlay], path: Path, title: str) -> None:
     """The recording for the viewer, where there is a wheel to write it."""
     from rollover.cli import console
 
@@ -319,4 +319,4 @@ def _draw(found: Diagnosis, told: Sequence[Told], path: Path, title: str) -> Non
             raise
         console.say(f"No rerun wheel for this platform: {path.name} was not written.")
         return
-    write_diagnosis(found, told, path, title)
+    write_diagnosis(found, overlays, path, title)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.condition_uncertainty import Marginalised, doubts, marginalised
+from rollover.diagnosis.data.condition_uncertainty import Marginalised, marginalised, nuisance
 from rollover.diagnosis.data.whitening import Noise, Whitening
 from rollover.diagnosis.forward.discontinuities import (
     DISCONTINUITY_IN,
@@ -102,7 +102,7 @@ class Dataset:
     averaged: int = 1  # samples in one
     first_impact: float = np.inf  # s, after which a run may take another course
     doubtful: tuple[Mapping[str, Any], ...] = ()  # values exchanged for 1 sigma of each uncertain condition
-    doubts: Array | None = None  # what that does to the stack, SI, (n, q)
+    nuisance: Array | None = None  # what that does to the stack, SI, (n, q)
 
     def cut(self, inside: Sequence[NDArray[np.bool_]]) -> Dataset:
         """The samples of each signal that are `inside` (n,) of it."""
@@ -111,13 +111,13 @@ class Dataset:
             self,
             signals=tuple(s.cut(those) for s, those in zip(self.signals, inside, strict=True)),
             perturbed=tuple(d[rows] for d in self.perturbed),
-            doubts=None if self.doubts is None else self.doubts[rows],
+            nuisance=None if self.nuisance is None else self.nuisance[rows],
         )
 
     @cached_property
     def marginalised(self) -> Marginalised:
         """What takes the uncertain conditions, and zeros, out of a whitened misfit."""
-        columns = [] if self.doubts is None else list(self.doubts.T)
+        columns = [] if self.nuisance is None else list(self.nuisance.T)
         for s, part in self.spans():
             if s.zero_error > 0.0:
                 columns.append(np.zeros(self.count))
@@ -265,7 +265,7 @@ class Dataset:
 def with_uncertain_conditions(e: Dataset, scenario: Scenario) -> Dataset:
     """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
     return with_uncertain_conditions_at(
-        replace(e, doubtful=tuple(doubts(scenario, e.recording.uncertainty, e.name))), {}
+        replace(e, doubtful=tuple(nuisance(scenario, e.recording.uncertainty, e.name))), {}
     )
 
 
@@ -277,7 +277,7 @@ def with_uncertain_conditions_at(e: Dataset, beside: Mapping[str, Any], shift: f
     base = e.simulator.predict(beside, shift)
     moved = [e.simulator.predict({**beside, **one}, shift) for one in e.doubtful]
     columns = [e.raw(m) - e.raw(base) for m in moved if m is not None and base is not None]
-    return replace(e, doubts=np.stack(columns, axis=1)) if columns else e
+    return replace(e, nuisance=np.stack(columns, axis=1)) if columns else e
 
 
 def dataset_of(name: str, recording: Recording, simulator: Simulator, averaged: int = 1) -> Dataset | None:

@@ -129,13 +129,13 @@ def _usual_factor(channel: str, usual: float) -> float:
 
     Where it is near no slip's, all of it.
     """
-    known = (1.0, *(abs(cause) for cause, _ in _usual_slips(describe(channel).unit)))
+    known = (1.0, *(abs(cause) for cause, _ in _usual_unit_errors(describe(channel).unit)))
     near = min(known, key=lambda one: _log_distance(usual, one))
     return usual / near if _log_distance(usual, near) < TUNING.common_factor_tolerance else usual
 
 
 def _inconsistency(e: Dataset, s: Signal, factor: float, beside: float) -> Inconsistency | None:
-    near = min(_usual_slips(describe(s.channel).unit), key=lambda cause: _log_distance(factor / beside, cause[0]))
+    near = min(_usual_unit_errors(describe(s.channel).unit), key=lambda cause: _log_distance(factor / beside, cause[0]))
     if _log_distance(factor / beside, near[0]) > TUNING.factor_tolerance:
         return None
     return Inconsistency(dataset=e, signal=s, factor=factor, cause=near[1])
@@ -155,7 +155,7 @@ def _log_distance(factor: float, other: float) -> float:
 
 
 @cache
-def _usual_slips(unit: str) -> tuple[tuple[float, str], ...]:
+def _usual_unit_errors(unit: str) -> tuple[tuple[float, str], ...]:
     """(factor, what makes it) of each slip that a channel of this unit may have, the usual units first."""
     return tuple(_each(unit))
 

@@ -78,8 +78,8 @@ def without_spikes(recording: Recording, before: float = np.inf) -> tuple[Record
     """
     channels, lines = dict(recording.channels), []
     for name in recording.channels:
-        told = trace(recording, name)
-        found = [] if told is None else [f for f in spikes(told, "") if f.start < before]
+        channel_trace = trace(recording, name)
+        found = [] if channel_trace is None else [f for f in spikes(channel_trace, "") if f.start < before]
         if found:
             gone = np.isin(recording.time, [f.start for f in found])
             channels[name] = np.where(gone, np.nan, recording.channels[name])

@@ -29,11 +29,11 @@ def with_rounding_uncertainty(
         shares = [sigma / abs(v) if v else math.inf for v in values]
         if values and max(shares) <= TUNING.most_rounding and max(shares) > TUNING.least_rounding:
             known[path] = sigma
-    told = [
+    digits = [
         (name, replace(r, uncertainty={**{p: s for p, s in known.items() if p in r.conditions}, **r.uncertainty}))
         for name, r in recordings
     ]
-    return told, [
+    return digits, [
         f"{path} is taken as rounded, +-{s:.2g}: state it as `uncertainty` in the sidecar" for path, s in known.items()
     ]
 

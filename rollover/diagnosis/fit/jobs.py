@@ -66,10 +66,10 @@ class Task:
         every = (*self.candidates, *(() if self.form is None else (self.form,)))
         names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in every]
         ways = self.how, self.only, self.rounds, self.width, self.fixed_shifts, self.stretch, self.leaves
-        told = hashlib.sha256(repr((about, names, self.start, self.shifts, ways)).encode())
+        shared = hashlib.sha256(repr((about, names, self.start, self.shifts, ways)).encode())
         for J in self.reused or ():
-            told.update(J.tobytes())
-        return told.hexdigest()
+            shared.update(J.tobytes())
+        return shared.hexdigest()
 
     @property
     def recordings(self) -> tuple[int, ...]:
@@ -115,8 +115,8 @@ class Executor:
     def begin(self, problem: Problem) -> None:
         """Begin the children, if any, while this process goes on: each makes a run, so that it has all it needs."""
         if self.workers > 1 and not problem.effort.is_ensemble:
-            told = self._told(problem, self._about(problem))
-            self._beginning = [self.children.pool.schedule(_begun, args=(told,)) for _ in range(self.workers)]
+            shared = self._shared_file(problem, self._about(problem))
+            self._beginning = [self.children.pool.schedule(_begun, args=(shared,)) for _ in range(self.workers)]
 
     def is_there(self) -> bool:
         """Whether the children have begun."""
@@ -153,8 +153,8 @@ class Executor:
             ended(k, work(problem, tasks[k]))
         if done == len(todo):
             return found
-        told, rest = self._told(problem, about), todo[done:]
-        outcomes = map_cases(_worked, [(told, tasks[k]) for k in rest], children=self.children)
+        shared, rest = self._shared_file(problem, about), todo[done:]
+        outcomes = map_cases(_worked, [(shared, tasks[k]) for k in rest], children=self.children)
         for outcome in outcomes:
             k = rest[outcome.index]
             if outcome.failure is not None:
@@ -171,10 +171,10 @@ class Executor:
         """
         if problem.effort.is_ensemble or len(things) < 2 or not self.is_there():
             return serial_map(problem, look, things)
-        told = self._told(problem, self._about(problem))
+        shared = self._shared_file(problem, self._about(problem))
         shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
         found: dict[int, R] = {}
-        for start, (seen, made) in enumerate(self.each(_looked, [(told, look, share) for share in shares if share])):
+        for start, (seen, made) in enumerate(self.each(_looked, [(shared, look, share) for share in shares if share])):
             problem.simulations += made
             found |= {start + 2 * self.workers * k: one for k, one in enumerate(seen)}
         return [found[k] for k in range(len(things))]
@@ -195,7 +195,7 @@ class Executor:
         """What all fits depend on beside their jobs."""
         return f"{self.about} {_fingerprint(problem)}"
 
-    def _told(self, problem: Problem, about: str) -> Path:
+    def _shared_file(self, problem: Problem, about: str) -> Path:
         """A file with the judge for children to read, once each: megabytes for each of a thousand jobs take long."""
         if self._folder is None:
             self._folder = self._scratch.enter_context(scratch())
@@ -263,7 +263,7 @@ def _fingerprint(problem: Problem) -> str:
     total = hashlib.sha256(repr(problem.heavy_tailed).encode())
     for e in problem.dataset:
         total.update(repr((e.name, e.shift_prior)).encode())
-        total.update(b"" if e.doubts is None else e.doubts.tobytes())
+        total.update(b"" if e.nuisance is None else e.nuisance.tobytes())
         for s in e.signals:
             total.update(
                 repr((s.channel, s.sigma, s.ar, s.zero_error)).encode() + s.values.tobytes() + s.rows.tobytes()
@@ -276,30 +276,30 @@ def _fingerprint(problem: Problem) -> str:
 _held: dict[Path, Problem] = {}  # in a child: what it simulated for the job before
 
 
-def _begun(told: Path) -> None:
-    _kept(told).fit((), (), rounds=1)
+def _begun(shared: Path) -> None:
+    _kept(shared).fit((), (), rounds=1)
 
 
 def _worked(case: tuple[Path, Task]) -> tuple[Fitted | None, int]:
-    told, task = case
-    problem = _kept(told)
+    shared, task = case
+    problem = _kept(shared)
     before = problem.simulations
     return work(problem, task), problem.simulations - before
 
 
 def _looked(case: tuple[Path, Callable[[Problem, Any], Any], list[Any]]) -> tuple[list[Any], int]:
-    told, look, things = case
-    problem = _kept(told)
+    shared, look, things = case
+    problem = _kept(shared)
     before = problem.simulations
     return serial_map(problem, look, things), problem.simulations - before
 
 
-def _kept(told: Path) -> Problem:
+def _kept(shared: Path) -> Problem:
     """The judge of a file, with what it simulated before."""
-    if told not in _held:
+    if shared not in _held:
         _held.clear()
-        _held[told] = pickle.loads(told.read_bytes())
-    return _held[told]
+        _held[shared] = pickle.loads(shared.read_bytes())
+    return _held[shared]
 
 
 def _rebuilt(problem: Problem, task: Task, row: dict[str, Any] | None) -> Fitted | None:

@@ -287,7 +287,7 @@ class Problem(Simulations):
         blocks: list[ResidualBlock] = [b for b in found if b is not None]
         best, damping = total_of(blocks), 1e-3
         borrowed = reused is not None  # whether slopes are those of another place
-        told = x  # where all were last worked out
+        linearised_at = x  # where all were last worked out
         for turn in range(rounds):
             A, b = np.zeros((len(x), len(x))), np.zeros(len(x))
             for block in blocks:
@@ -338,14 +338,14 @@ class Problem(Simulations):
             fd_step = 0.0 if has_no_jacobian else self.effort.fine if last else fd_steps[width]
             # what is held already moves little: its slopes are worked out anew only where the search narrows, or where
             # they lead astray or not far, as those of another place along a valley do; where a run is dear a short fit
-            # keeps all that foretold well, and another ends with those of a place beside it
+            # keeps all that predicted well, and another ends with those of a place beside it
             slow = gain < TUNING.reuse_least_share * due or gain < TUNING.reuse_least_gain * best
             anew = fresh or (slow and not self.effort.is_ensemble)
             kept = 0 if anew else len(x) if no_jacobian and self.effort.is_ensemble and not slow else fixed
-            if last and self.effort.is_ensemble and told is not None and self.is_beside(x, told):
+            if last and self.effort.is_ensemble and linearised_at is not None and self.is_beside(x, linearised_at):
                 kept = len(x)
             elif anew and not has_no_jacobian:
-                told = x
+                linearised_at = x
             borrowed = self.effort.is_ensemble and ((borrowed and not anew) or 0 < kept == len(x))
             if not has_no_jacobian:
                 self.simulate_neighbourhood(use, candidates, x, shifts, fd_step, kept)

@@ -230,7 +230,7 @@ def _tried(
 
 def has_uncertain_conditions(problem: Problem) -> bool:
     """Whether conditions leave something uncertain whose work beside an effect is worth its runs."""
-    return not problem.effort.is_ensemble and any(e.doubts is not None for e in problem.dataset)
+    return not problem.effort.is_ensemble and any(e.nuisance is not None for e in problem.dataset)
 
 
 def refitted_with_conditions(problem: Problem, fitted: Fitted) -> Fitted:
@@ -258,8 +258,8 @@ def representative_recordings(f: Fitted) -> list[int]:
 
 def completed_shifts(shifts: Sequence[float], short: Fitted, few: Sequence[int]) -> tuple[float, ...]:
     """Time shifts (s) of all recordings: as fitted to the few that a short fit was made to, elsewhere as given."""
-    told = {r: block.shift for r, block in zip(few, short.blocks, strict=True)}
-    return tuple(told.get(r, s) for r, s in enumerate(shifts))
+    known_shifts = {r: block.shift for r, block in zip(few, short.blocks, strict=True)}
+    return tuple(known_shifts.get(r, s) for r, s in enumerate(shifts))
 
 
 def all_but_one(fitted: Fitted, k: int) -> tuple[list[Candidate], list[int]]:

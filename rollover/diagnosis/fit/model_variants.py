@@ -39,7 +39,7 @@ def with_fitted_shape(problem: Problem, f: Fitted, leaves: Sequence[float]) -> F
         found = min((one for one in (found, onward) if one is not None), key=lambda one: one.left)
     if found.left > _reach_of_all(f, leaves):
         return None
-    found = found if is_noise(found) or found.left > TUNING.no_valley_above * sum(leaves) else polish(problem, found)
+    found = found if is_noise(found) or found.left > TUNING.no_ridge_above * sum(leaves) else polish(problem, found)
     (whole, x), shifts = found.candidates[-1].plain(found.own), [b.shift for b in found.blocks]
     bent = problem.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
     own = dict(zip(found.candidates[-1].search, found.own, strict=True))

@@ -44,8 +44,8 @@ class Candidate:
     @property
     def key(self) -> str:
         """Id, with the channel of a sensor effect and what is not fitted."""
-        told = [str(v) for v in self.fixed.values()]
-        return ":".join([self.id, *([] if self.channel is None else [self.channel]), *told])
+        suggested = [str(v) for v in self.fixed.values()]
+        return ":".join([self.id, *([] if self.channel is None else [self.channel]), *suggested])
 
     @cached_property
     def token(self) -> tuple[object, ...]:
@@ -63,9 +63,9 @@ class Candidate:
         return bool(EFFECTS[self.id].narrow)
 
     @property
-    def is_sudden(self) -> bool:
+    def is_discontinuous(self) -> bool:
         """Whether it does something at the least of its strength already."""
-        return EFFECTS[self.id].is_sudden
+        return EFFECTS[self.id].is_discontinuous
 
     @property
     def rings(self) -> bool:
@@ -73,7 +73,7 @@ class Candidate:
         return EFFECTS[self.id].is_abrupt and {"stiffness", "damping"} <= self.search.keys()
 
     @property
-    def is_bent(self) -> bool:
+    def has_secondary(self) -> bool:
         """Whether it is fitted in another shape or form than its usual one."""
         return bool(self.form) or not set(self.search).isdisjoint(EFFECTS[self.id].shapes)
 
@@ -208,7 +208,7 @@ class Candidate:
 
     def forms(self) -> list[Candidate]:
         """The same effect in its other forms, which are not fitted; none where it has a form or its shape is fitted."""
-        if self.is_bent:
+        if self.has_secondary:
             return []
         found = []
         for form in EFFECTS[self.id].forms:
@@ -239,8 +239,8 @@ class Candidate:
                 axes.append([0.1, 0.6])
             else:
                 many = (TUNING.threshold_count if len(self.search) > 1 else 4) if not axes else 1
-                told = [] if s.told is None else [coordinate(s.told, s)]
-                axes.append([(k + 0.5) / many for k in range(many)] + told)
+                suggested = [] if s.suggested is None else [coordinate(s.suggested, s)]
+                axes.append([(k + 0.5) / many for k in range(many)] + suggested)
         return list(itertools.product(*axes))
 
     def further(self) -> list[tuple[float, ...]]:

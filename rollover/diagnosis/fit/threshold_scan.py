@@ -88,7 +88,7 @@ def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) ->
     finely beside the fit, on few recordings. What rings keeps its frequency meanwhile.
     """
     if fitted.candidates[-1].rings:
-        return _along_frequency_valley(problem, fitted, stretch)
+        return _along_frequency_ridge(problem, fitted, stretch)
     last, shifts = fitted.candidates[-1], [b.shift for b in fitted.blocks]
     k, at = stretch[0], len(fitted.x) - len(fitted.own)
     few = range(len(shifts)) if is_clock(fitted) else representative_recordings(fitted)  # each has its own edges
@@ -123,7 +123,7 @@ def _best_start(
     return [one.x for one in short[1:] if one is not None and one.total < own]
 
 
-def _along_frequency_valley(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
+def _along_frequency_ridge(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
     """The fit of what rings begun anew with another shape, along the valley of its frequency; never worse."""
     shifts, at = [b.shift for b in fitted.blocks], len(fitted.x) - len(fitted.own)
     bent, own = fitted.candidates[-1].bent(fitted.own)

@@ -41,8 +41,10 @@ def _tops(recordings: Sequence[Recording]) -> Found:
     every: Found = {}
     for r, recording in enumerate(recordings):
         for channel in recording.channels:
-            told = trace(recording, channel)
-            every.setdefault(channel, []).extend((r, f) for f in (clipping(told, "") if told is not None else ()))
+            channel_trace = trace(recording, channel)
+            every.setdefault(channel, []).extend(
+                (r, f) for f in (clipping(channel_trace, "") if channel_trace is not None else ())
+            )
     most = {c: max(float(np.nanmax(np.abs(r[c]))) for r in recordings if c in r.channels) for c in every}
     return {
         channel: tops

@@ -41,7 +41,7 @@ class Discrepancy:
         """Whether another estimate is clearly smaller in any channel."""
         return any(other.scales.get(c, s) < TUNING.refit_below * s for c, s in self.scales.items())
 
-    def told(self, dataset: Sequence[Dataset]) -> dict[str, Scale]:
+    def scales_by_channel(self, dataset: Sequence[Dataset]) -> dict[str, Scale]:
         """Scale of each channel in its unit, and its correlation time where it is known."""
         spans: dict[str, list[float]] = {}
         for e in dataset:
@@ -78,11 +78,11 @@ def residual_rms(problem: Problem, fitted: Fitted) -> dict[str, float]:
 
 def without_condition_errors(e: Dataset, residual: Array) -> Array:
     """A misfit (n,), SI, without what uncertain conditions make of it at their most probable values."""
-    if e.doubts is None:
+    if e.nuisance is None:
         return residual
-    N = e.whitened(e.doubts)
+    N = e.whitened(e.nuisance)
     pulls = np.linalg.solve(np.eye(N.shape[1]) + N.T @ N, N.T @ e.whitened(residual))
-    return np.asarray(residual - e.doubts @ pulls)
+    return np.asarray(residual - e.nuisance @ pulls)
 
 
 def estimated(problem: Problem, base: Fitted, tried: Sequence[Fitted]) -> Discrepancy:
@@ -92,13 +92,13 @@ def estimated(problem: Problem, base: Fitted, tried: Sequence[Fitted]) -> Discre
     """
     models = [base, *tried]
     left = [residual_rms(problem, m) for m in models]
-    told = [{c: posterior(v) for c, v in one.items()} for one in left]
-    score = len(problem.dataset) * np.array([sum(v for _, v in one.values()) for one in told])
+    scales_by_channel = [{c: posterior(v) for c, v in one.items()} for one in left]
+    score = len(problem.dataset) * np.array([sum(v for _, v in one.values()) for one in scales_by_channel])
     weight = np.exp(score - score.max())
     weight /= weight.sum()
     scales = {}
     for channel in left[0]:
-        power = sum(w * one[channel][0] ** 2 for w, one in zip(weight, told, strict=True))
+        power = sum(w * one[channel][0] ** 2 for w, one in zip(weight, scales_by_channel, strict=True))
         scales[channel] = float(np.sqrt(power))
     times = correlation_times(problem, models[int(np.argmax(weight))])
     return Discrepancy(scales=scales, times=times, by_none=left[0], is_estimated=True)

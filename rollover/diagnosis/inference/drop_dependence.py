@@ -118,9 +118,9 @@ def loading_paths(
     problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap = serial_map
 ) -> tuple[list[list[ResidualBlock]], list[Descent]]:
     """Each recording at some time shifts, and its way down at the best of them."""
-    told = shifts_from_contact(problem, base.candidates, base.x, parallel_map)
+    shifts = shifts_from_contact(problem, base.candidates, base.x, parallel_map)
     found = parallel_map(
-        problem, partial(_loading_path, base=base), list(zip(range(len(scenarios)), scenarios, told, strict=True))
+        problem, partial(_loading_path, base=base), list(zip(range(len(scenarios)), scenarios, shifts, strict=True))
     )
     return [blocks for blocks, _ in found], [best for _, best in found if best is not None]
 
@@ -133,13 +133,13 @@ def _loading_path(
     Far from an explanation a shift eats what is missing: tried are the base's, what a clock says, the one that the
     first contact tells, and the one that goes with a force that may be anything.
     """
-    r, scenario, told = one
+    r, scenario, shifts = one
     e, b = problem.dataset[r], base.blocks[r]
     blocks, best = [b], descent(scenario, e, b)
     tried = [b.shift]
     shift = 0.0 if e.recording.clock.zero != "unknown" else b.shift
     for turn in range(TUNING.most_shifts):
-        shift = told if turn == 1 and told is not None else shift
+        shift = shifts if turn == 1 and shifts is not None else shift
         if min(abs(shift - other) for other in tried) > TUNING.same_shift * b.prior:
             there = problem.block(r, base.candidates, base.x, shift, 0.0)
             other = None if there is None else descent(scenario, e, there)

@@ -98,11 +98,11 @@ def with_secondary(problem: Problem, fitted: Fitted) -> tuple[Fitted, Array, lis
         own = fitted.x[place]
         kept += range(len(x), len(x) + len(own))
         usual = {name: getattr(EFFECTS[c.id](), name) for name in c.shapes}
-        told = all(v is not None and c.shapes[name].low <= v <= c.shapes[name].high for name, v in usual.items())
-        whole = c.with_secondary(own)[0] if told and usual else own
+        estimated = all(v is not None and c.shapes[name].low <= v <= c.shapes[name].high for name, v in usual.items())
+        whole = c.with_secondary(own)[0] if estimated and usual else own
         prior += [GENTLE] * len(own) + [EVENLY**-2] * (len(whole) - len(own))
         x += whole
-        candidates.append(c.whole() if told else c)
+        candidates.append(c.whole() if estimated else c)
     if len(x) > len(kept) and not problem.effort.is_ensemble:
         found = linearised(problem, candidates, x, [b.shift for b in fitted.blocks])
         if found is not None:
@@ -161,7 +161,7 @@ def _rippled(fitted: Fitted) -> set[int]:
 
     From sample to sample that a threshold passes the misfit rises and falls again, along a valley longer than one wave.
     """
-    bent = (own for c, own in with_slices(fitted.candidates) if c.is_bent)
+    bent = (own for c, own in with_slices(fitted.candidates) if c.has_secondary)
     return {k for own in bent for k in range(own.start, own.stop)}
 
 
@@ -266,9 +266,9 @@ def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: 
             ]
             return [None if f is None else f.blocks for f in met]
 
-        told = roughness_extents(runs, [b.unweighted_J @ way for b in fitted.blocks], TWO_SIDED**2 * dispersion)
-        if told is not None:
-            found[k] = told
+        estimated = roughness_extents(runs, [b.unweighted_J @ way for b in fitted.blocks], TWO_SIDED**2 * dispersion)
+        if estimated is not None:
+            found[k] = estimated
     return found
 
 
@@ -317,7 +317,7 @@ def intervals(
     found by `quadratic_extents` where runs scatter, else by `profile_extents`; with `sides` by the latter alone, others
     as wide as slopes say. `coarse` is the fit that `refined_by_ensemble_mean` moved to this one.
     """
-    told, coarse = fitted, coarse or fitted
+    estimated, coarse = fitted, coarse or fitted
     fitted, prior, kept = with_secondary(problem, fitted)
     p = len(fitted.x)
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + np.diag(prior)
@@ -343,7 +343,7 @@ def intervals(
         moved += ensemble_variance(problem.dataset, fitted.blocks, inverse) + shape_variance(problem, fitted, inverse)
         rest = ensemble_mean_step(problem.dataset, fitted.blocks)
     moved += rest**2
-    moved[kept] += ((np.array(told.x) - np.array(coarse.x)) / (SETTINGS.fit.ensemble_mean.finer_parts - 1)) ** 2
+    moved[kept] += ((np.array(estimated.x) - np.array(coarse.x)) / (SETTINGS.fit.ensemble_mean.finer_parts - 1)) ** 2
     variance = sd**2 + moved
     if strayed:
         variance = np.maximum(variance, between_recording_variance(problem.dataset, fitted.blocks, inverse))
@@ -356,14 +356,14 @@ def intervals(
     far = profile_extents(problem, coarse, own, dispersion, sides)
     wide = np.fmax(np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (far**2 - 1.0)), own[:, None] * rough)
     if not problem.effort.is_ensemble:
-        wide = _within_range(problem, told, wide, dispersion)
+        wide = _within_range(problem, estimated, wide, dispersion)
     found, at = [], 0
-    for c in told.candidates:
+    for c in estimated.candidates:
         kind: Any = EFFECTS[c.id]
         units = units_of(kind, c.channel)
         values: dict[str, Interval] = {}
         for name, search in c.search.items():
-            x = told.x[at]
+            x = estimated.x[at]
             values[name] = Interval(
                 value=physical(x, search),
                 low=possible(kind, name, physical(max(x - TWO_SIDED * wide[at, 0], -TUNING.outside_range), search)),

@@ -33,11 +33,14 @@ def lost(
 
 def _breaks(recording: Recording, channel: str) -> Iterator[tuple[float, float]]:
     """(start, end), s, of each run of exact zeros, and of each leap."""
-    told = trace(recording, channel)
-    if told is None:
+    channel_trace = trace(recording, channel)
+    if channel_trace is None:
         return
-    yield from ((f.start, f.end) for f in stuck(told, "") if f.value == 0.0)
-    yield from ((float(told.time[k - 1]), float(told.time[k])) for k in leaping(told, recording.cfc.get(channel)))
+    yield from ((f.start, f.end) for f in stuck(channel_trace, "") if f.value == 0.0)
+    yield from (
+        (float(channel_trace.time[k - 1]), float(channel_trace.time[k]))
+        for k in leaping(channel_trace, recording.cfc.get(channel))
+    )
 
 
 def loss_sentence(places: Sequence[Place]) -> str:

@@ -50,17 +50,17 @@ def wrong_conditions(every: Sequence[Dataset]) -> list[WrongCondition]:
     known = [e for e in every if _speed(e) > 0.0 and np.isfinite(e.simulator.contact)]
     if not TUNING.least_recordings <= len(known) == len(every):
         return []
-    told = [(e, s, a) for e in known for s in e.signals if s.channel == DEPTH and (a := _factor(e, s)) > 0.0]
-    if len(told) < TUNING.least_recordings:
+    factors = [(e, s, a) for e in known for s in e.signals if s.channel == DEPTH and (a := _factor(e, s)) > 0.0]
+    if len(factors) < TUNING.least_recordings:
         return []
-    x, y = np.log([_speed(e) for e, *_ in told]), np.log([a for *_, a in told])
+    x, y = np.log([_speed(e) for e, *_ in factors]), np.log([a for *_, a in factors])
     off = [_deviation(r, x, y) for r in range(x.size)]
     r = int(np.argmax([abs(d) / error for d, error in off]))
     d, error = off[r]
     if abs(d) < max(TUNING.least_deviation, TUNING.least_errors * error):
         return []
-    e, signal, _ = told[r]
-    best = [_best_speed(other) for other, *_ in told]
+    e, signal, _ = factors[r]
+    best = [_best_speed(other) for other, *_ in factors]
     more, _ = _deviation(r, x, np.array([log_ for log_, _ in best]))
     _, left = best[r]
     stated = _misfit_power(e, _speed(e))

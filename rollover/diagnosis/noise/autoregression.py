@@ -25,7 +25,7 @@ from rollover.recording.noise_floor import LENGTH, NoiseFloor, grown, noise_floo
 
 Array = NDArray[np.float64]
 Member = tuple[int, int, Signal, slice]  # a recording, the place of a signal of it, that, and its part of the stack
-Told = tuple[int, int, Signal, float, tuple[float, ...]]  # the same with a noise and its memory
+NoiseEstimate = tuple[int, int, Signal, float, tuple[float, ...]]  # the same with a noise and its memory
 Memory = Callable[[Sequence[Array]], tuple[float, tuple[float, ...]]]
 TUNING = SETTINGS.noise.autoregression
 ENOUGH = 2 * TUNING.least_windows * LENGTH  # samples that have as many
@@ -38,11 +38,11 @@ def with_noise_of_quiet_stretches(dataset: Sequence[Dataset], residuals: Sequenc
     for members in signals_of_one_recorder(dataset):
         misfits, values = [], []
         for r, _, s, part in members:
-            told = _before_the_impact(dataset[r], s)
+            estimates = _before_the_impact(dataset[r], s)
             without_lines = _cleaned(dataset[r], s, residuals[r][part], humming)
-            misfits.append((without_lines / s.heteroscedasticity)[told])
-            values.append(((s.values - residuals[r][part] + without_lines) / s.heteroscedasticity)[told])
-        sizes = loudness_ratio(misfits, values)
+            misfits.append((without_lines / s.heteroscedasticity)[estimates])
+            values.append(((s.values - residuals[r][part] + without_lines) / s.heteroscedasticity)[estimates])
+        sizes = level_ratio(misfits, values)
         misfits, values = ([v / size for v, size in zip(each, sizes, strict=True)] for each in (misfits, values))
         common = _quieter(misfits, values)
         if common is None:
@@ -61,7 +61,7 @@ def with_noise_of_quiet_stretches(dataset: Sequence[Dataset], residuals: Sequenc
     return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
 
 
-def loudness_ratio(misfits: Sequence[Array], values: Sequence[Array]) -> Array:
+def level_ratio(misfits: Sequence[Array], values: Sequence[Array]) -> Array:
     """How many times as loud each of several short recordings is as they are on the whole, (n,); 1 if chance makes it.
 
     An amplifier may have been set for each test. What has many windows tells its own noise by these; by second
@@ -99,24 +99,26 @@ def with_noise_of_residuals(dataset: Sequence[Dataset], residuals: Sequence[Arra
         # what comes now and then is no noise
         if members and not any(is_bursting(m[2], part, _level(part)) for m, part in zip(members, parts, strict=True)):
             shared.append((members, parts))
-    told = [one for both in shared for one in _pooled_noise(*both, autoregression)]
-    slow = channels_with_slow_residuals(told)
+    estimates = [one for both in shared for one in _pooled_noise(*both, autoregression)]
+    slow = channels_with_slow_residuals(estimates)
     misfits: dict[str, list[tuple[Dataset, Signal, Array]]] = {}
     for members, parts in shared:
         each = ((dataset[r], s, p) for (r, _, s, _), p in zip(members, parts, strict=True))
         misfits.setdefault(members[0][2].channel, []).extend(each)
     far = {channel for channel, every in misfits.items() if is_recorder_noise(every)}
     if slow <= far:
-        told = [one for one in told if one[2].channel not in far]
-        told += [one for both in shared if both[0][0][2].channel in far for one in _pooled_noise(*both, long_memory)]
+        estimates = [one for one in estimates if one[2].channel not in far]
+        estimates += [
+            one for both in shared if both[0][0][2].channel in far for one in _pooled_noise(*both, long_memory)
+        ]
         slow = set()
-    for r, k, s, sigma, ar in told:
+    for r, k, s, sigma, ar in estimates:
         if s.channel not in slow:
             found[r][k] = with_noise(s, sigma, ar, dataset[r].model_error_of(s))
     return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
 
 
-def _pooled_noise(members: Sequence[Member], parts: Sequence[Array], memory: Memory) -> list[Told]:
+def _pooled_noise(members: Sequence[Member], parts: Sequence[Array], memory: Memory) -> list[NoiseEstimate]:
     """Noise of recordings alike by what each leaves: one colour of all, and one level unless they clearly differ."""
     levels = np.array([_level(p) for p in parts])
     _, ar = memory([p / level for p, level in zip(parts, levels, strict=True)])
@@ -151,10 +153,10 @@ def _cleaned(e: Dataset, s: Signal, misfit: Array, humming: Mapping[str, tuple[f
     return without(e.recording.time[s.rows], misfit, humming[s.channel])
 
 
-def channels_with_slow_residuals(told: Sequence[Told]) -> set[str]:
+def channels_with_slow_residuals(estimates: Sequence[NoiseEstimate]) -> set[str]:
     """Channels whose misfits are so much slower than their quiet stretches that they are no noise."""
     by: dict[str, list[tuple[float, float, int]]] = {}
-    for _, _, s, sigma, ar in told:
+    for _, _, s, sigma, ar in estimates:
         noise, own = s.quiet
         if noise > 0.0 and sigma > 0.0:
             more = np.log(low_frequency_level(sigma, ar) / low_frequency_level(noise, own))
@@ -245,7 +247,7 @@ def rests(dataset: Sequence[Dataset]) -> list[dict[str, Rest]]:
     """
     found: list[dict[str, Rest]] = [{s.channel: Rest() for s in e.signals} for e in dataset]
     for members in signals_of_one_recorder(dataset):
-        told = sum(int(dataset[r].early[part].sum()) for r, _, _, part in members)
+        estimates = sum(int(dataset[r].early[part].sum()) for r, _, _, part in members)
         for r, _, s, _ in members:
             e = dataset[r]
             cfc = e.recording.cfc.get(s.channel)
@@ -255,7 +257,7 @@ def rests(dataset: Sequence[Dataset]) -> list[dict[str, Rest]]:
             if 1.0 / step < least_rate(cfc):
                 continue
             filtered = _correlation(step, float(np.median(np.diff(s.rows))), cfc)
-            if abs(s.ar[0] - filtered[1]) * np.sqrt(told) < TUNING.filter_errors:
+            if abs(s.ar[0] - filtered[1]) * np.sqrt(estimates) < TUNING.filter_errors:
                 found[r][s.channel] = Rest(correlation=filtered, ar=s.ar)
     return found
 

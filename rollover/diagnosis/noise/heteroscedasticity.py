@@ -31,10 +31,10 @@ def with_variance_model(dataset: Sequence[Dataset]) -> list[Dataset]:
     """The evidence with each sample's noise where that clearly grows with the value, (D10)."""
     found = [list(e.signals) for e in dataset]
     for members in signals_of_one_recorder(dataset):
-        told = [t for r, _, s, _ in members if (t := _values_and_noise(dataset[r], s)) is not None and _varies(*t)]
-        if not told or not _grows(told):
+        quiet = [t for r, _, s, _ in members if (t := _values_and_noise(dataset[r], s)) is not None and _varies(*t)]
+        if not quiet or not _grows(quiet):
             continue
-        law, least = _variance_polynomial(told)
+        law, least = _variance_polynomial(quiet)
         for r, k, s, _ in members:
             level = np.sqrt(np.maximum(np.polyval(law, _smoothed(s.values)), least) / least)
             found[r][k] = replace(s, level=level)
@@ -52,9 +52,9 @@ def _values_and_noise(e: Dataset, s: Signal) -> tuple[Array, Array] | None:
     return s.values[2:-2], np.abs(np.diff(s.values, 4)) / np.sqrt(70.0)
 
 
-def _sizes(told: Sequence[tuple[Array, Array]], by: Array) -> tuple[Array, Array, int]:
+def _sizes(quiet: Sequence[tuple[Array, Array]], by: Array) -> tuple[Array, Array, int]:
     """Median value and size in bins of equally many samples, sorted `by`; samples of one."""
-    values, sizes = (np.concatenate(each) for each in zip(*told, strict=True))
+    values, sizes = (np.concatenate(each) for each in zip(*quiet, strict=True))
     parts = np.array_split(np.argsort(by, kind="stable"), TUNING.bins)
     found = np.array([[np.median(values[p]), USUAL * np.median(sizes[p])] for p in parts])
     return found[:, 0], found[:, 1], parts[0].size
@@ -66,10 +66,10 @@ def _varies(values: Array, sizes: Array) -> bool:
     return bool(high - low > TUNING.least_range * USUAL * np.median(sizes))
 
 
-def _grows(told: Sequence[tuple[Array, Array]]) -> bool:
+def _grows(quiet: Sequence[tuple[Array, Array]]) -> bool:
     """Whether the noise of large values is clearly louder than that of small ones, in all together and in most."""
     ratios, weights = [], []
-    for one in told:
+    for one in quiet:
         _, size, count = _sizes([one], np.abs(one[0]))
         if size.min() <= 0.0:
             return False
@@ -81,9 +81,9 @@ def _grows(told: Sequence[tuple[Array, Array]]) -> bool:
     )
 
 
-def _variance_polynomial(told: Sequence[tuple[Array, Array]]) -> tuple[Array, float]:
+def _variance_polynomial(quiet: Sequence[tuple[Array, Array]]) -> tuple[Array, float]:
     """Coefficients of s^2 by the value, highest power first, by least squares over what is seen; its least."""
-    value, size, _ = _sizes(told, np.concatenate([values for values, _ in told]))
+    value, size, _ = _sizes(quiet, np.concatenate([values for values, _ in quiet]))
     scale = float(np.max(np.abs(value)))
     x = np.vander(value / scale, 3)
     law = np.linalg.lstsq(x / size[:, None] ** 2, np.ones(value.size), rcond=None)[0]

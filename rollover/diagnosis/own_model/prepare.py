@@ -59,9 +59,9 @@ def with_noise(model: ForwardModel, every: Sequence[Dataset]) -> list[Dataset]:
     base = begun(model, problem)
     if base is None:
         return list(every)
-    told = autoregression.with_noise_of_quiet_stretches(every, problem.residuals(base))
+    estimates = autoregression.with_noise_of_quiet_stretches(every, problem.residuals(base))
     found = []
-    for e, old in zip(told, every, strict=True):
+    for e, old in zip(estimates, every, strict=True):
         signals = [
             s if (stated := old.recording.noise.get(s.channel)) is None else _stated(o, stated, old)
             for s, o in zip(e.signals, old.signals, strict=True)

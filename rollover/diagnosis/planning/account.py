@@ -16,13 +16,13 @@ FILES = (JSON, PAGE)
 
 def account(found: Plan, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """What plan.json says, bare JSON values; `about` names what was asked."""
-    told = asdict(found)
-    effects, pairs, tests = (told.pop(key) for key in ("effects", "pairs", "next_tests"))
+    fields = asdict(found)
+    effects, pairs, tests = (fields.pop(key) for key in ("effects", "pairs", "next_tests"))
     answer: dict[str, Any] = plain(
         {
             "format": FORMAT,
             **(about or {}),
-            **told,
+            **fields,
             "effects": effects,
             "pairs": [{**p, "is_told_apart": p["probability"] >= found.told_apart} for p in pairs],
             "next_tests": tests,

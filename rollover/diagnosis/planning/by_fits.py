@@ -38,9 +38,9 @@ def next_test(scenario: Scenario, dataset: Sequence[Dataset], one: Fitted, other
             continue
         chances = []
         for truth, rival in ((one, other), (other, one)):
-            told = Problem([extra]).predicted_with_jumps(0, truth.candidates, truth.x, 0.0)
+            predicted = Problem([extra]).predicted_with_jumps(0, truth.candidates, truth.x, 0.0)
             before = alone[id(rival)]
-            after = None if told is None else _refitted([*dataset, showing(extra, told)], rival)
+            after = None if predicted is None else _refitted([*dataset, showing(extra, predicted)], rival)
             if before is not None and after is not None:
                 chances.append(choice(max(after - before, 0.0)))
         if len(chances) == 2:

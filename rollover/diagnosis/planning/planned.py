@@ -111,12 +111,12 @@ def _gained(e: Dataset, gain: float) -> Dataset:
     """The same with an error of each channel's gain among what is uncertain."""
     if gain <= 0.0:
         return e
-    columns = [] if e.doubts is None else list(e.doubts.T)
+    columns = [] if e.nuisance is None else list(e.nuisance.T)
     for s, part in e.spans():
         column = np.zeros(e.count)
         column[part] = gain * s.values
         columns.append(column)
-    return replace(e, doubts=np.stack(columns, axis=1))
+    return replace(e, nuisance=np.stack(columns, axis=1))
 
 
 def showing(e: Dataset, raw: Array) -> Dataset:
@@ -128,6 +128,6 @@ def only(e: Dataset, channels: Sequence[str]) -> Dataset:
     """The recording of some of its channels alone."""
     kept = [s.channel in channels for s in e.signals]
     rows = np.concatenate([np.full(s.rows.size, k) for s, k in zip(e.signals, kept, strict=True)])
-    doubts = None if e.doubts is None else e.doubts[rows]
+    nuisance = None if e.nuisance is None else e.nuisance[rows]
     signals = tuple(s for s, k in zip(e.signals, kept, strict=True) if k)
-    return replace(e, signals=signals, doubts=doubts)
+    return replace(e, signals=signals, nuisance=nuisance)

@@ -78,8 +78,10 @@ def without_unsupported_rivals(found: Step, looked: ScoreTest, spoken: float = T
     What speaks for one that acts somewhere speaks for its kin; for a strong one its runs did.
     """
     last = [f.candidates[-1] for f in found.rivals]
-    told = [c for c in last if c.key in looked.far or p_value(looked.scores.get(c.key, 0.0), looked.null) < spoken]
-    kept = [*told, *same_family(last, told)]
+    spoken_for = [
+        c for c in last if c.key in looked.far or p_value(looked.scores.get(c.key, 0.0), looked.null) < spoken
+    ]
+    kept = [*spoken_for, *same_family(last, spoken_for)]
     return replace(found, rivals=tuple(f for f in found.rivals if f.candidates[-1] in kept))
 
 

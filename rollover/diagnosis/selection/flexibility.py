@@ -79,7 +79,7 @@ def is_over_flexible(candidates: Sequence[Candidate]) -> bool:
     soil draws one on the way down and another on the way back.
     """
     subjects = [c.channel or _subject(c) for c in candidates]
-    bent = [s for s, c in zip(subjects, candidates, strict=True) if c.is_bent]
+    bent = [s for s, c in zip(subjects, candidates, strict=True) if c.has_secondary]
     return (len(candidates) == TUNING.most_effects and len(set(subjects)) == 1) or len(set(bent)) < len(bent)
 
 
@@ -91,4 +91,4 @@ def _subject(c: Candidate) -> str:
 def is_flexible_soil(candidates: Sequence[Candidate]) -> bool:
     """Whether several are of the soil, and one of these takes another shape or form than its usual one."""
     soil = [c for c in candidates if c.id.startswith("soil-")]
-    return len(soil) > 1 and any(c.is_bent for c in soil)
+    return len(soil) > 1 and any(c.has_secondary for c in soil)

@@ -169,7 +169,7 @@ def _first_fits(
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
     problem = inquiry.problem
     chosen = {s.candidate.key: s for s in _chosen(screened, problem.effort, looked)}
-    told: dict[str, float] = {}
+    nrmse_by_key: dict[str, float] = {}
     inquiry.say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
     fixed_shifts = problem.effort.is_ensemble or is_far(problem, base)
@@ -187,7 +187,7 @@ def _first_fits(
     fits += _robust_short_fits(inquiry, far, few)
     for one in fits:
         key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
-        told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
+        nrmse_by_key[key] = min(nrmse_by_key.get(key, np.inf), float(np.sqrt(one.left / size)))
     fits.sort(key=lambda f: f.left)
     worth = [
         f for k, f in enumerate(fits) if k < problem.effort.leaders or f.left < TUNING.followed_misfit * fits[0].left
@@ -207,7 +207,7 @@ def _first_fits(
     # a first fit may lead astray what scored most
     if all(f.candidates[-1].key != looked.best for f in worth):
         worth += [f for f in fits if f.candidates[-1].key == looked.best][:1]
-    return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
+    return [replace(s, nrmse=nrmse_by_key.get(s.candidate.key, 0.0)) for s in screened], worth
 
 
 def _elsewhere_of(base: Fitted) -> list[tuple[float, ...]]:

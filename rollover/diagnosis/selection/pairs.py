@@ -186,7 +186,7 @@ def _with_thresholds_scanned(
 
     Alone, for all that is missing, it may have ended elsewhere, or nowhere.
     """
-    able = [c for c, _ in partners if has_threshold(c) and not c.is_bent]
+    able = [c for c, _ in partners if has_threshold(c) and not c.has_secondary]
     ways = [(a, x, c) for a, x in partners[: TUNING.leading] for c in able if c.key != a.key]
     look = partial(threshold_starts, few=tuple(few), shifts=tuple(shifts), base=base)
     each = zip(ways, inquiry.parallel_map(look, ways), strict=True)
@@ -271,10 +271,10 @@ def _partners(
     found: dict[tuple[str, bool], tuple[Candidate, tuple[float, ...]]] = {}
     for f in (*leading, *later):
         last = f.candidates[-1]
-        found.setdefault((last.key, last.is_bent), (last, f.own))
-    known, bent = {key for key, _ in found}, {key for key, is_bent in found if is_bent}
+        found.setdefault((last.key, last.has_secondary), (last, f.own))
+    known, bent = {key for key, _ in found}, {key for key, has_secondary in found if has_secondary}
     ranked = sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
     for k, s in enumerate(ranked):
         if s.candidate.key in bent or (k < scored and s.candidate.key not in known):
-            found.setdefault((s.candidate.key, s.candidate.is_bent), (s.candidate, s.starts[0]))
+            found.setdefault((s.candidate.key, s.candidate.has_secondary), (s.candidate, s.starts[0]))
     return list(found.values())

@@ -48,16 +48,16 @@ def initial_time_shifts(problem: Problem, base: Fitted, parallel_map: ParallelMa
     """
     count = sum(b.residual.size for b in base.blocks)
     if problem.effort.is_ensemble or problem.samples_per_error > 1.0:
-        told: list[float | None] = [None] * len(base.blocks)
+        contact_shifts: list[float | None] = [None] * len(base.blocks)
         if not problem.effort.is_ensemble and not is_far(problem, base):
             return [b.shift for b in base.blocks]
     elif base.left < TUNING.biased_shifts**2 * count:
         return [b.shift for b in base.blocks]
     else:
-        told = shifts_from_contact(problem, base.candidates, base.x, parallel_map)
+        contact_shifts = shifts_from_contact(problem, base.candidates, base.x, parallel_map)
     return [
         at if at is not None else b.shift if e.recording.clock.zero == "unknown" else 0.0
-        for at, b, e in zip(told, base.blocks, problem.dataset, strict=True)
+        for at, b, e in zip(contact_shifts, base.blocks, problem.dataset, strict=True)
     ]
 
 
@@ -82,7 +82,7 @@ def screen(
 
     def places(c: Candidate) -> tuple[tuple[float, ...], ...]:
         ways = () if problem.effort.is_ensemble and not c.is_placed else looked.starts.get(c.key, ())
-        is_led = (near or c.is_placed) and ways and not c.is_sudden
+        is_led = (near or c.is_placed) and ways and not c.is_discontinuous
         return tuple(ways if is_led else (*ways, *c.starts()))
 
     problem.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in places(c) for r in few)

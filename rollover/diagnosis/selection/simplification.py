@@ -105,7 +105,9 @@ def _in_usual_shapes(inquiry: Inquiry, found: Step) -> Step | None:
     What had to be bent to do another's work as well is straight again once that stands beside it.
     """
     best, usual = found.fitted, {c.key: c for c in inquiry.candidates}
-    bent = [k for k, c in enumerate(best.candidates) if c.is_bent and usual[c.key].search.keys() <= c.search.keys()]
+    bent = [
+        k for k, c in enumerate(best.candidates) if c.has_secondary and usual[c.key].search.keys() <= c.search.keys()
+    ]
     if len(best.effects) < 2 or not bent:
         return None
     shifts, ways = tuple(b.shift for b in best.blocks), [bent, *([k] for k in bent if len(bent) > 1)]

@@ -116,7 +116,7 @@ class ModelVariants:
     same_place: float = 0.003  # coordinate (0 to 1): two short fits within it have met; chosen
     same_misfit: float = 0.01  # relative difference of misfits: fits near each other within it will meet; chosen
     # ratio to what another explanation leaves: above it a curved valley is not followed; chosen
-    no_valley_above: float = 1.2
+    no_ridge_above: float = 1.2
     # coordinate (0 to 1), from the fit: where the scan of another form's threshold begins; chosen
     threshold_low: float = -0.1
     threshold_high: float = 0.05  # coordinate (0 to 1), from the fit: where it ends; chosen

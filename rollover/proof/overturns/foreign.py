@@ -14,12 +14,14 @@ from rollover.proof.overturns.library import MOUNTS, YIELD_X, Change, Draw, Rand
 STIFF = 0.05  # m, gauge length over which a mount is strained
 
 
-def _yields(forces: Mapping[str, float], told: Mapping[str, float], form: str, source: str, **more: Any) -> Change:
+def _yields(
+    forces: Mapping[str, float], parameters: Mapping[str, float], form: str, source: str, **more: Any
+) -> Change:
     values: dict[str, Any] = {}
     for mount, force in forces.items():
         values[f"vehicle.rops.mounts.{mount}.yield_force"] = [YIELD_X, force, None]
         values |= {f"vehicle.rops.mounts.{mount}.{name}": value for name, value in more.items()}
-    return Change(id="rops-plasticity", kind="physics", told=told, values=values, form=form, source=source)
+    return Change(id="rops-plasticity", kind="physics", parameters=parameters, values=values, form=form, source=source)
 
 
 def _whole(random: Random) -> float:
@@ -30,17 +32,17 @@ def _whole(random: Random) -> float:
 def _hardening(random: Random) -> Change:
     """Behind the yield a tangent of 3 to 25 % of the elastic stiffness."""
     whole, share = _whole(random), log_uniform(random, 0.03, 0.25)
-    told = {"yield_force": whole, "tangent": share}
+    parameters = {"yield_force": whole, "tangent": share}
     source = "bilinear hardening, Chen, Han, Plasticity for Structural Engineers 1988"
-    return _yields(dict.fromkeys(MOUNTS, 0.5 * whole), told, "hardening", source, hardening=[0.0, share, 0.0])
+    return _yields(dict.fromkeys(MOUNTS, 0.5 * whole), parameters, "hardening", source, hardening=[0.0, share, 0.0])
 
 
 def _by_rate(random: Random) -> Change:
     """F_y (1 + (rate/D)^(1/q)) of mild steel, D = 40.4 1/s, q = 5, over some gauge length."""
     whole, gauge = _whole(random), log_uniform(random, 0.5 * STIFF, 4.0 * STIFF)
-    told = {"static_force": whole, "gauge_length": gauge}
+    parameters = {"static_force": whole, "gauge_length": gauge}
     rate = {"rate": 40.4, "exponent": 5.0, "gauge_length": gauge}
-    return _yields(dict.fromkeys(MOUNTS, 0.5 * whole), told, "by-rate", "Cowper, Symonds 1957", rate_factor=rate)
+    return _yields(dict.fromkeys(MOUNTS, 0.5 * whole), parameters, "by-rate", "Cowper, Symonds 1957", rate_factor=rate)
 
 
 def _one_by_one(random: Random) -> Change:

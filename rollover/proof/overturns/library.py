@@ -25,7 +25,7 @@ YIELD_X = 15_000.0
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """An effect at a strength: `told` are its parameters by the names of the contract, `values` those of the scenario.
+    """An effect at a strength: `parameters` by the names of the contract, `values` those of the scenario.
 
     `tilt` (rad) is added to the inclination of every test's ground, its roll rate is `pushed` times what is written
     down; `channel` is the one that `fault` spoils; `depends_on` and `near` are for what no table of effects holds.
@@ -33,7 +33,7 @@ class Change:
 
     id: str
     kind: str  # physics, parameter, sensor, outside
-    told: Mapping[str, float]
+    parameters: Mapping[str, float]
     values: Mapping[str, Any] = field(default_factory=dict)
     tilt: float = 0.0
     pushed: float = 1.0
@@ -61,20 +61,20 @@ def _either(random: Random, low: float, high: float) -> float:
 def _friction(random: Random, _: Mapping[str, float]) -> Change:
     mu = FRICTION * math.exp(_either(random, 0.15, 0.9))
     return Change(
-        id="ground-friction", kind="physics", told={"coefficient": mu}, values={"ground.friction.coefficient": mu}
+        id="ground-friction", kind="physics", parameters={"coefficient": mu}, values={"ground.friction.coefficient": mu}
     )
 
 
 def _plasticity(random: Random, _: Mapping[str, float]) -> Change:
     whole = log_uniform(random, 3000.0, 11_000.0)
     values = {f"vehicle.rops.mounts.{m}.yield_force": [YIELD_X, 0.5 * whole, None] for m in MOUNTS}
-    return Change(id="rops-plasticity", kind="physics", told={"yield_force": whole}, values=values)
+    return Change(id="rops-plasticity", kind="physics", parameters={"yield_force": whole}, values=values)
 
 
 def _tyre_damping(random: Random, _: Mapping[str, float]) -> Change:
     c = TYRE_DAMPING * math.exp(_either(random, 0.5, 2.0))
     values = {f"vehicle.wheels.{w}.tyre.vertical_damping": c for w in TYRES}
-    return Change(id="tyre-damping", kind="physics", told={"damping": c}, values=values)
+    return Change(id="tyre-damping", kind="physics", parameters={"damping": c}, values=values)
 
 
 def _axle_stop(random: Random, _: Mapping[str, float]) -> Change:
@@ -82,35 +82,43 @@ def _axle_stop(random: Random, _: Mapping[str, float]) -> Change:
     return Change(
         id="axle-stop",
         kind="physics",
-        told={"angle": math.radians(swing)},
+        parameters={"angle": math.radians(swing)},
         values={"vehicle.front_axle.swing_deg": swing},
     )
 
 
 def _slosh(random: Random, _: Mapping[str, float]) -> Change:
-    told = {"mass": log_uniform(random, 60.0, 400.0), "length": log_uniform(random, 0.15, 0.6)}
-    return Change(id="tank-slosh", kind="physics", told=told, values=_term("tank-slosh", {**told, "damping": 0.02}))
+    parameters = {"mass": log_uniform(random, 60.0, 400.0), "length": log_uniform(random, 0.15, 0.6)}
+    return Change(
+        id="tank-slosh",
+        kind="physics",
+        parameters=parameters,
+        values=_term("tank-slosh", {**parameters, "damping": 0.02}),
+    )
 
 
 def _payload(random: Random, _: Mapping[str, float]) -> Change:
-    told = {"mass": log_uniform(random, 60.0, 400.0), "travel": log_uniform(random, 0.06, 0.3)}
+    parameters = {"mass": log_uniform(random, 60.0, 400.0), "travel": log_uniform(random, 0.06, 0.3)}
     friction = float(random.uniform(0.2, 0.5))
     return Change(
-        id="payload-shift", kind="physics", told=told, values=_term("payload-shift", {**told, "friction": friction})
+        id="payload-shift",
+        kind="physics",
+        parameters=parameters,
+        values=_term("payload-shift", {**parameters, "friction": friction}),
     )
 
 
 def _layer(random: Random, _: Mapping[str, float]) -> Change:
-    told = {"depth": log_uniform(random, 0.006, 0.02), "stiffness_ratio": log_uniform(random, 1.5, 5.0)}
-    return Change(id="soil-layer", kind="physics", told=told, values=_term("soil-layer", told))
+    parameters = {"depth": log_uniform(random, 0.006, 0.02), "stiffness_ratio": log_uniform(random, 1.5, 5.0)}
+    return Change(id="soil-layer", kind="physics", parameters=parameters, values=_term("soil-layer", parameters))
 
 
 def _air(_: Random, __: Mapping[str, float]) -> Change:
-    return Change(id="air-drag", kind="physics", told={"area": 2.0}, values=_term("air-drag", {"area": 2.0}))
+    return Change(id="air-drag", kind="physics", parameters={"area": 2.0}, values=_term("air-drag", {"area": 2.0}))
 
 
-def _term(id: str, told: Mapping[str, float]) -> dict[str, Any]:
-    return {f"effects.{id}.{name}": value for name, value in told.items()}
+def _term(id: str, parameters: Mapping[str, float]) -> dict[str, Any]:
+    return {f"effects.{id}.{name}": value for name, value in parameters.items()}
 
 
 def _centre(random: Random, _: Mapping[str, float]) -> Change:
@@ -119,7 +127,7 @@ def _centre(random: Random, _: Mapping[str, float]) -> Change:
     return Change(
         id="centre-of-mass",
         kind="parameter",
-        told={"height": up, "lateral": left},
+        parameters={"height": up, "lateral": left},
         values={"vehicle.whole.centre_of_mass": [x, y + left, z + up]},
     )
 
@@ -127,19 +135,19 @@ def _centre(random: Random, _: Mapping[str, float]) -> Change:
 def _inertia(random: Random, _: Mapping[str, float]) -> Change:
     scale = math.exp(_either(random, 0.03, 0.3))
     values = {"vehicle.whole.inertia": [scale * v for v in INERTIA]}
-    return Change(id="inertia", kind="parameter", told={"scale": scale}, values=values)
+    return Change(id="inertia", kind="parameter", parameters={"scale": scale}, values=values)
 
 
 def _tilted(random: Random, _: Mapping[str, float]) -> Change:
     angle = _either(random, 0.005, 0.05)
-    return Change(id="slope", kind="parameter", told={"angle": angle}, tilt=angle)
+    return Change(id="slope", kind="parameter", parameters={"angle": angle}, tilt=angle)
 
 
 def _sensor(id: str, fault: Callable[[Random, float], tuple[dict[str, float], Fault]]) -> Draw:
     def draw(random: Random, spans: Mapping[str, float]) -> Change:
         channel = str(random.choice(sorted(spans)))
-        told, wrong = fault(random, spans[channel])
-        return Change(id=id, kind="sensor", told=told, channel=channel, fault=wrong)
+        parameters, wrong = fault(random, spans[channel])
+        return Change(id=id, kind="sensor", parameters=parameters, channel=channel, fault=wrong)
 
     return draw
 

@@ -21,7 +21,7 @@ def _flat(random: Random, _: Mapping[str, float]) -> Change:
     return Change(
         id="outside:flat-tyre",
         kind="outside",
-        told={"share": share},
+        parameters={"share": share},
         values={f"vehicle.wheels.{wheel}.tyre.vertical_stiffness": share * STIFF[wheel]},
         depends_on="attitude",
         near=("centre-of-mass", "slope", "tyre-lateral-stiffness"),
@@ -36,7 +36,12 @@ def _pushed(random: Random, _: Mapping[str, float]) -> Change:
     factor = math.exp(log_uniform(random, 0.05, 0.3) * float(random.choice((-1.0, 1.0))))
     near = ("slope", "inertia", "centre-of-mass")
     return Change(
-        id="outside:pushed", kind="outside", told={"factor": factor}, pushed=factor, depends_on="attitude", near=near
+        id="outside:pushed",
+        kind="outside",
+        parameters={"factor": factor},
+        pushed=factor,
+        depends_on="attitude",
+        near=near,
     )
 
 
@@ -45,10 +50,16 @@ def _fault(
 ) -> Draw:
     def drawn(random: Random, spans: Mapping[str, float]) -> Change:
         channel = str(random.choice(sorted(spans)))
-        told = draw(random, spans[channel])
-        wrong: dict[str, Any] = dict(told)
+        parameters = draw(random, spans[channel])
+        wrong: dict[str, Any] = dict(parameters)
         return Change(
-            id=id, kind="outside", told=told, channel=channel, fault=Fault(**wrong), depends_on=depends_on, near=near
+            id=id,
+            kind="outside",
+            parameters=parameters,
+            channel=channel,
+            fault=Fault(**wrong),
+            depends_on=depends_on,
+            near=near,
         )
 
     return drawn

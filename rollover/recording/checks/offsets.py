@@ -46,14 +46,16 @@ def before_contact(t: Trace) -> slice | None:
     return slice(0, count)
 
 
-def zero_offsets(traces: Mapping[str, Trace], mass: float | None, gravity: float, told: set[str]) -> Iterator[Finding]:
-    """Channels that carry nothing before the first contact, and read something there; not those already `told`.
+def zero_offsets(
+    traces: Mapping[str, Trace], mass: float | None, gravity: float, stated: set[str]
+) -> Iterator[Finding]:
+    """Channels that carry nothing before the first contact, and read something there; not those already `stated`.
 
     In a drop the load cell and the depth, in any test what loads a ROPS or measures how it gives way.
     """
     is_drop = not any(name.startswith(VEHICLE) for name in traces)
     for name, t in traces.items():
-        if name in told or not (_ANY.fullmatch(name) or (is_drop and _DROP.fullmatch(name))):
+        if name in stated or not (_ANY.fullmatch(name) or (is_drop and _DROP.fullmatch(name))):
             continue
         where = before_contact(t)
         if where is None:

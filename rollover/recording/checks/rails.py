@@ -25,17 +25,17 @@ BOUNDED = ("chassis/quaternion", "ground/contact_area")  # end at one value by w
 ANGLES = "rad"  # turn over at 180 degrees
 
 
-def rails(t: Trace, unit: str, told: set[float]) -> Iterator[Finding]:
+def rails(t: Trace, unit: str, stated: set[float]) -> Iterator[Finding]:
     """Ends of a channel that several peaks reach to the last digit, or one that is a full scale's round number.
 
-    `told` are ends that have been found flat already.
+    `stated` are ends that have been found flat already.
     """
     if t.floor.sigma == 0.0 or t.channel.startswith(BOUNDED):
         return
     for sign in (1.0, -1.0):
         x = sign * t.values
         extreme = float(x.max())
-        if extreme <= 0.0 or any(abs(sign * extreme - value) <= EXACT * abs(value) for value in told):
+        if extreme <= 0.0 or any(abs(sign * extreme - value) <= EXACT * abs(value) for value in stated):
             continue
         at = _peaks_at(x, extreme)
         if not at.size:

@@ -68,12 +68,12 @@ class ByFile:
         found = matched(parts_of(self.pattern), path.name, self.decimal)
         if len(found) == 1:
             return {name: value_of(text, self.decimal) for name, text in found[0].items()}
-        told = f"the name {'fits' if found else 'does not fit'} conditions_from.name of {self.file}"
+        where = f"the name {'fits' if found else 'does not fit'} conditions_from.name of {self.file}"
         if not found:
-            what = f"{told}, got {path.name!r} for {self.pattern!r}; another pattern, or a table of conditions"
+            what = f"{where}, got {path.name!r} for {self.pattern!r}; another pattern, or a table of conditions"
         else:
             ways = " or ".join(", ".join(f"{k} = {v}" for k, v in way.items()) for way in found)
-            what = f"{told} in two ways, got {ways} by {self.pattern!r}; write out more of the name in the pattern"
+            what = f"{where} in two ways, got {ways} by {self.pattern!r}; write out more of the name in the pattern"
         raise InputError(Fault(file=str(path), message=what))
 
 

@@ -132,12 +132,12 @@ class _Where:
 
     def follow(self, location: tuple[Any, ...]) -> _Where:
         steps = list(location)
-        told: Node | None = None  # whose kind was a step: a key below may bear the same name
+        kind_node: Node | None = None  # whose kind was a step: a key below may bear the same name
         while steps:
             value, kind = self.node.value, self.slot.kind(self.node.kind)
-            if self.slot.by_kind and isinstance(value, Mapping) and steps[0] == kind and told is not self.node:
+            if self.slot.by_kind and isinstance(value, Mapping) and steps[0] == kind and kind_node is not self.node:
                 steps.pop(0)  # the validator names the chosen kind as a step of its own
-                told = self.node
+                kind_node = self.node
                 continue
             step = steps.pop(0)
             below: Node | None = None
