@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.condition_uncertainty import doubts, marginalised
+from rollover.diagnosis.data.condition_uncertainty import marginalised, nuisance_parameters
 from rollover.diagnosis.data.dataset import Dataset, condition_groups, dataset_of, left_out, with_uncertain_conditions
 from rollover.diagnosis.data.repeatability import with_scatter
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
@@ -93,13 +93,13 @@ def test_an_effect_is_fitted_better_beside_speeds_that_are_wrong(monkeypatch: py
 
 def test_list_uncertainty_is_per_number_a_wrong_path_one_line() -> None:
     cube = shipped("cube_toss")
-    found = doubts(cube, {"initiation.velocity": (0.1, 0.2, 0.3)})
+    found = nuisance_parameters(cube, {"initiation.velocity": (0.1, 0.2, 0.3)})
     x, y, z = cube.initiation.velocity  # type: ignore[union-attr]
     assert found[1] == {"initiation.velocity": pytest.approx((x, y + 0.2, z))}
     assert len(found) == 3
     for wrong in ({"initiation.velocty": 0.1}, {"initiation.velocity": 0.1}, {"title": 0.1}):
         with pytest.raises(InputError, match="uncertainty: not a number of the scenario"):
-            doubts(cube, wrong, "r1")
+            nuisance_parameters(cube, wrong, "r1")
 
 
 def test_repeats_give_scatter_to_tests_made_once() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.condition_uncertainty import Marginalised, marginalised, nuisance
+from rollover.diagnosis.data.condition_uncertainty import Marginalised, marginalised, nuisance_parameters
 from rollover.diagnosis.data.whitening import Noise, Whitening
 from rollover.diagnosis.forward.discontinuities import (
     DISCONTINUITY_IN,
@@ -265,7 +265,7 @@ class Dataset:
 def with_uncertain_conditions(e: Dataset, scenario: Scenario) -> Dataset:
     """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
     return with_uncertain_conditions_at(
-        replace(e, doubtful=tuple(nuisance(scenario, e.recording.uncertainty, e.name))), {}
+        replace(e, doubtful=tuple(nuisance_parameters(scenario, e.recording.uncertainty, e.name))), {}
     )
 
 
