@@ -33,15 +33,15 @@ def pink(rng: np.random.Generator, n: int = N) -> np.ndarray:
     return np.asarray((found / found.std())[at : at + n])
 
 
-Told = list[tuple[Dataset, Signal, np.ndarray]]
+Signals = list[tuple[Dataset, Signal, np.ndarray]]
 
 
-def told(misfits: Sequence[np.ndarray], sigma: float = 1.0) -> Told:
+def signals_of(misfits: Sequence[np.ndarray], sigma: float = 1.0) -> Signals:
     e: Any = SimpleNamespace(recording=SimpleNamespace(time=TIME), simulator=SimpleNamespace(contact=0.0))
     return [(e, signal(w, sigma), w) for w in misfits]
 
 
-def share(make: Callable[[np.random.Generator], Told]) -> float:
+def share(make: Callable[[np.random.Generator], Signals]) -> float:
     """How often what is made is taken for a recorder's noise, of 100."""
     return sum(is_recorder_noise(make(np.random.default_rng(seed))) for seed in range(100)) / 100.0
 
@@ -61,19 +61,19 @@ def test_a_channel_silent_at_rest_has_no_recorder_noise() -> None:
     """Over no noise everything is slow, and as loud before as after: no number to go by."""
     rng = np.random.default_rng(1)
     with np.errstate(divide="raise", invalid="raise"):
-        assert not is_recorder_noise(told([pink(rng) for _ in range(6)], 0.0))
+        assert not is_recorder_noise(signals_of([pink(rng) for _ in range(6)], 0.0))
 
 
 def test_noise_of_one_over_f_is_its_recorder_s() -> None:
     """(A2) errs in one of a hundred, (A3) in up to twice two: 95, of 100 drawn with a standard deviation of 2.2."""
-    assert 0.92 < share(lambda rng: told([pink(rng) for _ in range(6)], 0.6)) < 1.0
+    assert 0.92 < share(lambda rng: signals_of([pink(rng) for _ in range(6)], 0.6)) < 1.0
 
 
 def test_white_noise_is_not_slow_whatever_comes_after() -> None:
     """A1 errs in one of a hundred: physics on quiet noise is never taken for noise, nor is an offset of all."""
 
-    def noise(rng: np.random.Generator, of: float, offset: float) -> Told:
-        return told([rng.standard_normal(N) + of * LATER + offset for _ in range(6)])
+    def noise(rng: np.random.Generator, of: float, offset: float) -> Signals:
+        return signals_of([rng.standard_normal(N) + of * LATER + offset for _ in range(6)])
 
     assert share(lambda rng: noise(rng, 0.0, 0.0)) <= 0.03
     assert share(lambda rng: noise(rng, 1.0, 0.0)) <= 0.03
@@ -81,8 +81,8 @@ def test_white_noise_is_not_slow_whatever_comes_after() -> None:
 
 
 def test_what_is_louder_after_the_contact_or_shared_is_missing() -> None:
-    def of(rng: np.random.Generator, sizes: Sequence[float]) -> Told:
-        return told([pink(rng) + size * LATER for size in sizes], 0.6)
+    def of(rng: np.random.Generator, sizes: Sequence[float]) -> Signals:
+        return signals_of([pink(rng) + size * LATER for size in sizes], 0.6)
 
     assert share(lambda rng: of(rng, 6 * [3.0])) <= 0.05
     assert share(lambda rng: of(rng, [4.0, -4.0, 5.0, -5.0, 6.0, -6.0])) <= 0.05
@@ -102,11 +102,11 @@ def test_what_is_louder_after_the_contact_or_shared_is_missing() -> None:
 def test_one_offset_is_shared_by_recordings_of_unlike_noise() -> None:
     """5 in each, under noise of 2, 2 and 0.8 that remembers 0.6, 0.65 and 0.2: no noise, as one was taken for."""
 
-    def make(rng: np.random.Generator) -> Told:
-        found: Told = []
+    def make(rng: np.random.Generator) -> Signals:
+        found: Signals = []
         for sigma, memory in ((2.0, 0.6), (2.0, 0.65), (0.8, 0.2)):
             w = lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], rng.standard_normal(N + 50))[50:]
-            [(e, _, misfit)] = told([5.0 + sigma * w])
+            [(e, _, misfit)] = signals_of([5.0 + sigma * w])
             found.append((e, signal(misfit, sigma * np.sqrt(1.0 - memory**2), (memory,)), misfit))
         return found
 
@@ -115,7 +115,7 @@ def test_one_offset_is_shared_by_recordings_of_unlike_noise() -> None:
 
 def test_two_recordings_or_a_short_approach_show_no_drift() -> None:
     rng = np.random.default_rng(2)
-    every = told([pink(rng) for _ in range(6)], 0.6)
+    every = signals_of([pink(rng) for _ in range(6)], 0.6)
     assert is_recorder_noise(every)
     assert not is_recorder_noise(every[:2])
     late: Any = SimpleNamespace(recording=SimpleNamespace(time=TIME + 0.045), simulator=SimpleNamespace(contact=0.0))

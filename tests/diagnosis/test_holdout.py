@@ -1,4 +1,4 @@
-"""What is foretold of recordings that were left out: by slopes, and by fits where these mislead."""
+"""What is predicted of recordings that were left out: by slopes, and by fits where these mislead."""
 
 from __future__ import annotations
 

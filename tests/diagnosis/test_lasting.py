@@ -60,7 +60,7 @@ def test_a_chance_gain_on_held_out_data_is_not_taken() -> None:
 
 
 def test_one_recordings_demand_may_be_its_runs_divergence() -> None:
-    """An effect of 3 noise units in one of four, foretold by a fit to all of them, or in each."""
+    """An effect of 3 noise units in one of four, predicted by a fit to all of them, or in each."""
     rng, groups = np.random.default_rng(4), [[k] for k in range(4)]
 
     def told(sizes: Sequence[float]) -> Step:

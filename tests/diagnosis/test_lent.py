@@ -1,4 +1,4 @@
-"""Slopes that need no runs of their own: lent by a fit of fewer effects, kept where they foretold well."""
+"""Slopes that need no runs of their own: lent by a fit of fewer effects, kept where they predicted well."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_slopes_of_another_place_are_no_reason_to_end() -> None:
 
 
 @pytest.mark.parametrize(("bend", "no_jacobian", "told"), [(0.0, True, 1), (4.0, True, 2), (0.0, False, 2)])
-def test_a_short_fit_keeps_slopes_that_foretold_well(bend: float, no_jacobian: bool, told: int) -> None:
+def test_a_short_fit_keeps_slopes_that_predicted_well(bend: float, no_jacobian: bool, told: int) -> None:
     """Of what is straight the first step leaves next to nothing; bent, it goes half as far again as it should."""
     problem, runs = judge_of(0.5, 0.6, bend)
     found = problem.fit((MASS, SLOPE), (0.2, 0.2), width=1, rounds=2, no_jacobian=no_jacobian)

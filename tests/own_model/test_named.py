@@ -79,7 +79,7 @@ def test_a_fault_of_an_output_is_its_sensors() -> None:
     assert found.effects[0].parameters["bias"].value == pytest.approx(-0.7, abs=0.003)
 
 
-def test_a_recording_that_is_held_out_is_foretold_by_the_others() -> None:
+def test_a_recording_that_is_held_out_is_predicted_by_the_others() -> None:
     recordings = measured(2.5, -0.7, bend=0.05)
     found = diagnose_model(model, recordings, hold_out=["r4"])
     assert (found.training, found.held_out) == (("r1", "r2", "r3"), ("r4",))

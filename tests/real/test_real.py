@@ -78,7 +78,7 @@ def test_the_spring_of_the_sprung_cones_is_found() -> None:
     for height in set(error["rigid"]) & set(cone_drops.HELD_OUT):
         assert error["stated"][height] < 0.6 * error["rigid"][height], height
         assert error["fitted"][height] < 0.4 * error["rigid"][height], height
-        # with water of its own a drop is foretold as well as by another drop from that height (1.7 to 3.5 %)
+        # with water of its own a drop is predicted as well as by another drop from that height (1.7 to 3.5 %)
         assert error["own"][height] < min(0.04, error["fitted"][height]), height
     # 7.8 N/mm by the authors; 15.2 % low where water stops growing as on rigid cones: what rings takes along more
     assert found["fitted"]["numbers"][cone_drops.STIFFNESS] == pytest.approx(cone_drops.SPRING, rel=0.16)

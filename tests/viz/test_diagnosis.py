@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rollover.recording.checks import Finding
-from tests.rollover.diagnosed import FORCE, nothing_found, sensor_at_fault, told
+from tests.rollover.diagnosed import FORCE, nothing_found, overlays, sensor_at_fault
 from tests.viz.html import Parts
 from viz.content.diagnosis_words import answer, markdown, ranked
 from viz.pages.diagnosis import page
@@ -23,7 +23,7 @@ FLAT = Finding(
 
 
 def test_the_page_of_a_finding() -> None:
-    text = page(sensor_at_fault(), told(), title="Drop", prechecks=[("one", FLAT)], command="rollover diagnose x")
+    text = page(sensor_at_fault(), overlays(), title="Drop", prechecks=[("one", FLAT)], command="rollover diagnose x")
     parts = Parts(text)
     assert parts.fetched() == []
     said = parts.said
@@ -55,7 +55,7 @@ def test_a_page_is_the_same_whoever_draws_its_figures() -> None:
         asked.extend(pickle.loads(pickle.dumps((function, things)))[1])  # as children are sent them
         return [function(thing) for thing in reversed(things)][::-1]
 
-    two = tuple(replace(t, tracks=(*t.tracks, replace(t.tracks[0], channel="ground/sinkage"))) for t in told())
+    two = tuple(replace(t, tracks=(*t.tracks, replace(t.tracks[0], channel="ground/sinkage"))) for t in overlays())
     about = sensor_at_fault(), two
     assert page(*about, title="Drop", command="x", each=backwards) == page(*about, title="Drop", command="x")
     channels = [[t.channel for t in one.tracks] for one, _ in asked]  # no other track goes with a figure
@@ -64,7 +64,7 @@ def test_a_page_is_the_same_whoever_draws_its_figures() -> None:
 
 def test_held_out_data_are_shown_with_their_prediction() -> None:
     """Of several the one that is missed most; not where the mismatch is looked for, and not twice."""
-    one, two = told()
+    one, two = overlays()
     worse = replace(two, recording="three", tracks=(replace(two.tracks[0], before=0.9 * two.tracks[0].before),))
     text = page(sensor_at_fault(), (one, two, worse), title="Drop", command="x")
     assert text.count("<svg") == 3
@@ -76,7 +76,7 @@ def test_held_out_data_are_shown_with_their_prediction() -> None:
 
 
 def test_the_page_where_nothing_was_found() -> None:
-    parts = Parts(page(nothing_found(), told(with_after=False), title="Drop", command="rollover diagnose x"))
+    parts = Parts(page(nothing_found(), overlays(with_after=False), title="Drop", command="rollover diagnose x"))
     assert "Simulation and recordings agree within the noise." in parts.said
     assert ["soil-viscous-damping", "damping", "120"] in parts.rows
     assert "Nothing was found in 2 recordings" in parts.said
@@ -86,8 +86,8 @@ def test_the_page_where_nothing_was_found() -> None:
 
 def test_one_condition_is_not_called_held_out() -> None:
     found = replace(sensor_at_fault(), training=("one", "two"), held_out=("one", "two"))
-    alike = tuple(replace(t, condition="initiation.speed=3") for t in told())
-    for shown, single in ((told(), False), (alike, True)):
+    alike = tuple(replace(t, condition="initiation.speed=3") for t in overlays())
+    for shown, single in ((overlays(), False), (alike, True)):
         text = page(found, shown, title="Drop", command="rollover diagnose x")
         assert ("nothing could be held out" in text) == single
 
@@ -102,16 +102,16 @@ def test_each_verdict_has_its_sentence() -> None:
 
 def test_the_recording_with_the_largest_share_comes_first() -> None:
     found = sensor_at_fault()
-    assert [one.recording for one, _ in ranked(found, told())] == ["one", "two"]
+    assert [one.recording for one, _ in ranked(found, overlays())] == ["one", "two"]
     moved = replace(found, where=(replace(found.where[0], recording="two"),))
-    assert [one.recording for one, _ in ranked(moved, told())] == ["two", "one"]
+    assert [one.recording for one, _ in ranked(moved, overlays())] == ["two", "one"]
 
 
 def test_residuals_are_over_the_noise() -> None:
-    track = told()[0].tracks[0]
+    track = overlays()[0].tracks[0]
     assert track.rms_after == pytest.approx(np.sqrt(0.5), rel=0.05)  # a sine of one sigma
     assert track.rms_before > 1.0
-    assert told(with_after=False)[0].tracks[0].rms_after is None
+    assert overlays(with_after=False)[0].tracks[0].rms_after is None
 
 
 @pytest.mark.parametrize("with_after", [True, False])
@@ -122,7 +122,7 @@ def test_the_recording_for_the_viewer(with_after: bool, tmp_path: Path) -> None:
 
     path = tmp_path / "diagnosis.rrd"
     found = sensor_at_fault() if with_after else nothing_found()
-    write_diagnosis(found, told(with_after=with_after), path, "Drop")
+    write_diagnosis(found, overlays(with_after=with_after), path, "Drop")
     assert check_rrd(path) == []
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
     entities = set(read_entities(path))
@@ -130,7 +130,7 @@ def test_the_recording_for_the_viewer(with_after: bool, tmp_path: Path) -> None:
     assert {f"{here}/measured", f"{here}/before", "/answer", "/one/phase"} <= entities
     assert (f"{here}/after" in entities) == with_after
     at, values = read_column(path, f"{here}/measured", "Scalars:scalars")
-    track = told()[1].tracks[0]
+    track = overlays()[1].tracks[0]
     assert len(at) == track.time.size + 1  # a gap, marked
     read = np.array([v[0] for v in values])
     assert np.isnan(read).sum() == 1

@@ -20,7 +20,7 @@ from rollover.proof.summary import tally
 from rollover.recording import Recording
 from rollover.recording.time_stamps import Zero
 from rollover.studies.baseline import Answer
-from tests.rollover.diagnosed import sensor_at_fault, told
+from tests.rollover.diagnosed import overlays, sensor_at_fault
 from tests.rollover.studies import made_up
 from tests.viz import example
 from tests.viz.browser import CHROMIUM, has_browser
@@ -106,7 +106,7 @@ def page_of(kind: str, folder: Path) -> str:
         )
     if kind == "diagnose":
         found = replace(sensor_at_fault(), notes=(HOSTILE,), sentence=HOSTILE)
-        shown = tuple(replace(t, recording=HOSTILE) for t in told())
+        shown = tuple(replace(t, recording=HOSTILE) for t in overlays())
         return diagnosis.page(found, shown, title=HOSTILE, command=HOSTILE, **ABOUT)
     if kind == "prove":
         rows = [row(HOSTILE, "single", "mass", "mass"), row("case-0002", "null", "", HOSTILE)]

@@ -206,12 +206,12 @@ def test_ground_begins_flat_and_ends_as_it_was_left(overturn: Run, overturn_rrd:
 def test_events_peaks_and_phases_are_told_in_order(overturn: Run, overturn_rrd: Path) -> None:
     time, texts = read_column(overturn_rrd, "/events", "TextLog:text")
     _, levels = read_column(overturn_rrd, "/events", "TextLog:level")
-    told = [(text[0], level[0]) for text, level in zip(texts, levels, strict=True)]
+    overlays = [(text[0], level[0]) for text, level in zip(texts, levels, strict=True)]
     assert np.all(np.diff(time) >= 0)
-    assert ("first touch, ROPS: crossbar at 3.4 m/s", "INFO") in told
-    assert ("plastic hinge, left: yields along y", "WARN") in told
-    assert ("ROPS force: 63.2 kN at 1.362 s", "PEAK") in told
-    assert told[-1] == ("came to rest at 2.600 s", "INFO")
+    assert ("first touch, ROPS: crossbar at 3.4 m/s", "INFO") in overlays
+    assert ("plastic hinge, left: yields along y", "WARN") in overlays
+    assert ("ROPS force: 63.2 kN at 1.362 s", "PEAK") in overlays
+    assert overlays[-1] == ("came to rest at 2.600 s", "INFO")
     start, names = read_column(overturn_rrd, "/phase", "StateChange:state")
     assert [n[0] for n in names] == ["support", "tipping", "impact", "rest"]
     assert start[2] == 1_310_000_000

@@ -9,7 +9,7 @@ import pytest
 
 from rollover.diagnosis.overlay import Track, _scatter
 from rollover.diagnosis.result import Diagnosis
-from tests.rollover.diagnosed import sensor_at_fault, told
+from tests.rollover.diagnosed import overlays, sensor_at_fault
 from viz.content.diagnosis_words import label_of
 from viz.pages.diagnosis import page
 from viz.recordings.diagnosis import PHASES
@@ -40,9 +40,9 @@ def test_scatter_is_what_neighbours_differ_by() -> None:
 def test_the_page_says_that_runs_differ() -> None:
     def shown(scatter: float | None) -> str:
         tracks = [
-            replace(t, scatter=None if scatter is None else np.full(t.time.size, scatter)) for t in told()[0].tracks
+            replace(t, scatter=None if scatter is None else np.full(t.time.size, scatter)) for t in overlays()[0].tracks
         ]
-        one = [replace(told()[0], tracks=tuple(tracks))]
+        one = [replace(overlays()[0], tracks=tuple(tracks))]
         return page(sensor_at_fault(), one, title="Overturn", command="rollover diagnose x")
 
     assert "ensemble scatter" in shown(30.0)
@@ -51,7 +51,7 @@ def test_the_page_says_that_runs_differ() -> None:
 
 def test_quantities_that_predict_nothing_need_no_table() -> None:
     found: Diagnosis = replace(sensor_at_fault(), dependencies=(("time", 0.001), ("ground/sinkage", -0.2)))
-    assert "as a function of" not in page(found, told(), title="Overturn", command="x")
+    assert "as a function of" not in page(found, overlays(), title="Overturn", command="x")
 
 
 def test_phases_and_quantities_of_overturns_have_names() -> None:

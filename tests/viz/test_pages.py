@@ -16,7 +16,7 @@ from rollover.comparison.run_pair import pair, read
 from rollover.proof.summary import tally
 from rollover.recording import Recording
 from rollover.studies.baseline import Answer, Difference
-from tests.rollover.diagnosed import sensor_at_fault, told
+from tests.rollover.diagnosed import overlays, sensor_at_fault
 from tests.viz import example
 from tests.viz.browser import CHROMIUM, has_browser
 from tests.viz.html import Parts
@@ -53,7 +53,7 @@ def page_of(kind: str, folder: Path) -> str:
         return pair_page.page(found_pair, command="rollover compare was now", versions=VERSIONS)
     if kind == "diagnose":
         return diagnosis.page(
-            sensor_at_fault(), told(), title="Drop", command="rollover diagnose drop_test rec", **about
+            sensor_at_fault(), overlays(), title="Drop", command="rollover diagnose drop_test rec", **about
         )
     if kind == "prove":
         rows = [row("case-0001", "single", "mass", "mass"), row("case-0002", "null", "", "soil-layer")]

@@ -156,9 +156,9 @@ def test_trajectory_then_loads_then_standards(overturn: Run, peaks: tuple[PeakLo
     order = re.findall(r"<h2>(.*?)</h2>", text)
     assert order[:4] == ["How it went", "Peak loads", "Calibrated domain", "Against standards"]
     strip = text[text.index("<h2>How it went") : text.index("<h2>Peak loads")]
-    told = re.search(r"At ([\d., ]+) s: hull", strip)
-    assert told is not None
-    stamps = [float(x) for x in told[1].split(", ")]
+    overlays = re.search(r"At ([\d., ]+) s: hull", strip)
+    assert overlays is not None
+    stamps = [float(x) for x in overlays[1].split(", ")]
     assert (stamps[0], stamps[-1]) == pytest.approx((overturn.frame_time[0], overturn.frame_time[-1]), abs=0.006)
     assert stamps == sorted(stamps)
     assert "How it went" not in report.page(example.drop(), (), ANSWER), "a striker goes straight down"
