@@ -283,7 +283,7 @@ def diagnose(
     hold_out: str | Sequence[str] = (),
     tolerance: float | Mapping[str, float] = 0.0,
     reference: str | Sequence[str] = (),
-    estimate: bool = False,
+    estimate: bool | None = None,
     profile: str | Path | None = None,
     workers: int = 0,
 ) -> Diagnosis:
@@ -300,7 +300,8 @@ def diagnose(
     reference
         Names of recordings of the same rig in which nothing is suspected: they teach that share.
     estimate
-        Estimate that share where nothing explains the recordings beside their noise, and diagnose again beside it.
+        Where no share is stated and nothing explains the recordings beside their noise, it is estimated, and they are
+        diagnosed again beside it. True: what it makes doubtful is not named either. False: it is not estimated.
     workers
         Child processes that fit at once; the answer is the same.
 

@@ -59,13 +59,18 @@ def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Group
 
     An effect predicts recordings that were held out, a discrepancy does not carry over to them but for what is common
     to all. So it is named where it predicts half of what the scenario misses there, surely some of it, and leaves no
-    more than the discrepancy; or surely half, and its family is not to be mistaken. Otherwise nothing is said to be
-    there where the scenario alone leaves no more than the discrepancy.
+    more than the discrepancy; or surely more than a discrepancy lends itself to, and its family is not to be mistaken.
+    Otherwise nothing is said to be there where the scenario alone leaves no more than the discrepancy, unless a part
+    of that is surely predicted: something is there then that no name fits.
     """
     nothing: Verdict = "no-mismatch" if is_tolerated(problem, found.base) else "unexplained"
     if not found.parts or found.parts[0].p_value > SETTINGS.inference.lack_of_fit.p_value:
         return found.refused(), nothing
     whole, _ = shares(problem, found, groups)
+    # the best of many surely predicts a part of any background by the interval of one alone
+    part = share_of(problem, found.base, found.fitted, groups, among=len(found.parts[0].rivals))
+    if part is not None and part.low > 0.0:
+        nothing = "unexplained"
     families = {f.candidates[-1].family for f in confusion(found.parts[0], groups, problem.samples_per_error)}
     is_enough = (
         whole is not None
@@ -73,7 +78,9 @@ def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Group
         and whole.low > 0.0
         and is_tolerated(problem, found.fitted)
     )
-    is_sure = whole is not None and whole.low >= TUNING.half_share and len(families) == 1
+    is_sure = (
+        whole is not None and whole.share >= TUNING.half_share and whole.low > TUNING.sure_share and len(families) == 1
+    )
     if is_enough or is_sure:
         return found, kind_of(found.fitted.candidates[-1])
     return found.refused(), nothing

@@ -24,7 +24,7 @@ def diagnosed(
     hold_out: str | Sequence[str],
     tolerance: float | Mapping[str, float],
     reference: str | Sequence[str],
-    estimate: bool,
+    estimate: bool | None,
     profile: str | Path | None,
     workers: int,
 ) -> Diagnosis:

@@ -40,12 +40,15 @@ def shares(problem: Problem, found: Explanation, groups: Groups) -> tuple[Share 
     return whole, each
 
 
-def share_of(problem: Problem, base: Fitted, fitted: Fitted, groups: Groups) -> Share | None:
-    """Share of the held-out mismatch of a base that a fit explains, (D20); None where noise leaves as much."""
+def share_of(problem: Problem, base: Fitted, fitted: Fitted, groups: Groups, among: int = 1) -> Share | None:
+    """Share of the held-out mismatch of a base that a fit explains, (D20); None where noise leaves as much.
+
+    Of the best `among` several the interval is as wide as the best of so many needs (Sidak).
+    """
     due = _due(problem, base, groups)
     if float(np.sum(due)) <= 0.0:
         return None
-    return jackknifed(held_out(base, groups).left - held_out(fitted, groups).left, due, groups)
+    return jackknifed(held_out(base, groups).left - held_out(fitted, groups).left, due, groups, among)
 
 
 def _due(problem: Problem, base: Fitted, groups: Groups) -> Array:
@@ -54,8 +57,11 @@ def _due(problem: Problem, base: Fitted, groups: Groups) -> Array:
     return np.asarray(held_out(base, groups).left - noise)
 
 
-def jackknifed(gained: Array, due: Array, groups: Groups) -> Share:
-    """Ratio sum(gained)/sum(due) of recordings (n,) with an interval by leaving out one group after another."""
+def jackknifed(gained: Array, due: Array, groups: Groups, among: int = 1) -> Share:
+    """Ratio sum(gained)/sum(due) of recordings (n,) with an interval by leaving out one group after another.
+
+    That is one of 95 %, or of the best `among` several one that holds with as much (Sidak).
+    """
     from scipy.special import stdtrit
 
     share = float(gained.sum() / due.sum())
@@ -65,7 +71,7 @@ def jackknifed(gained: Array, due: Array, groups: Groups) -> Share:
     if m < 2:
         return Share(share=min(share, 1.0), low=-np.inf, high=1.0)
     error = float(np.sqrt((m - 1) / m * np.sum((np.array(each) - np.mean(each)) ** 2)))
-    wide = float(stdtrit(m - 1, TUNING.one_sided_confidence)) * error
+    wide = float(stdtrit(m - 1, TUNING.one_sided_confidence ** (1.0 / among))) * error
     return Share(share=min(share, 1.0), low=share - wide, high=min(share + wide, 1.0))
 
 

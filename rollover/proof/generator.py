@@ -158,11 +158,20 @@ def cases(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[st
     return map(make, plan(count, seed, kinds, effects))
 
 
-def make(order: Order) -> Case:
-    """Make one case: the same for the same order, to the last bit."""
+def drops(order: Order) -> int:
+    """How many drops a case has, without making it."""
+    return len(_begun(order)[1].shots)
+
+
+def _begun(order: Order) -> tuple[np.random.Generator, Campaign]:
     random = np.random.default_rng([order.seed, order.index])
     needs = tuple(c for id in order.ids for c in _needs(random, id))
-    held = campaign.draw(random, needs, hard=order.kind == "decoy")
+    return random, campaign.draw(random, needs, hard=order.kind == "decoy")
+
+
+def make(order: Order) -> Case:
+    """Make one case: the same for the same order, to the last bit."""
+    random, held = _begun(order)
     rebounds = order.kind != "negligible" and (order.ids == ("soil-adhesion",) or random.random() < 0.04)
     rebounds = rebounds and "soil-elastic-rebound" not in order.ids
     held = replace(held, rebounds=rebounds)

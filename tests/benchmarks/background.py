@@ -23,7 +23,7 @@ from rollover.diagnosis import account, diagnose
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.io import recordings_in
 from rollover.proof.counts import share
-from rollover.proof.generator import Case, make, plan
+from rollover.proof.generator import Case, drops, make, plan
 from rollover.proof.handover import write_case
 from rollover.proof.score import score
 from rollover.scenario import load
@@ -44,7 +44,7 @@ def cases(count: int, seed: int, kind: str, background: float | str | None, *, o
     called = {"null": "background" if background else "null", "unlisted": "outside"}
     called["single"] = "single" if own else "foreign-form"
     orders = plan(8 * count, seed, [called[kind]], (), background)
-    return itertools.islice((case for case in map(make, orders) if len(case.recordings) == DROPS), count)
+    return map(make, itertools.islice((order for order in orders if drops(order) == DROPS), count))
 
 
 def diagnosed(case: Case, ways: Sequence[str]) -> Iterator[dict[str, Any]]:

@@ -73,13 +73,15 @@ SOME = (0.8, 0.9, 1.0, 0.9, 1.0, 0.8)  # of which a discrepancy of unit size lea
     ("base", "left", "p_value", "verdict"),
     [
         (SOME, (0.2, 0.2, 0.3, 0.2, 0.3, 0.2), 1e-9, "missing-physics"),  # three quarters, of each drop
-        (SOME, (0.5, 0.5, 0.6, 0.5, 0.6, 0.5), 1e-9, "no-mismatch"),  # less than half: what drops have in common
+        (SOME, (0.5, 0.5, 0.6, 0.5, 0.6, 0.5), 1e-9, "unexplained"),  # surely some, and less than half: without a name
+        (SOME, (0.3, 0.8, 1.1, 0.9, 0.6, 0.8), 1e-9, "no-mismatch"),  # some, maybe none: what drops have in common
         (SOME, (0.01, 1.2, 0.01, 1.3, 0.01, 0.01), 1e-9, "no-mismatch"),  # half, of some drops alone: maybe none
         (SOME, (0.05, 0.9, 0.1, 1.0, 0.1, 0.05), 1e-9, "missing-physics"),  # three fifths, and surely some of it
         (SOME, (0.2, 0.2, 0.3, 0.2, 0.3, 0.2), 0.2, "no-mismatch"),  # the best of all does as much by chance
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (0.5,) * 6, 1e-9, "missing-physics"),
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (5.0,) * 6, 1e-9, "unexplained"),
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (3.0,) * DROPS, 1e-9, "missing-physics"),  # leaves more, and is surely half
+        ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (3.0, 3.0, 3.0, 5.0, 6.0, 3.0), 1e-9, "missing-physics"),  # surely a third
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (3.0, 3.0, 3.0, 7.0, 7.0, 3.0), 1e-9, "unexplained"),
     ],
 )
@@ -91,6 +93,15 @@ def test_an_effect_is_named_where_it_predicts_half_else_forgiven(
     )
     assert said == verdict
     assert bool(found.parts) == (verdict == "missing-physics")
+
+
+def test_the_best_of_many_predicts_some_by_chance() -> None:
+    """Low end of the interval of one alone above zero; of the best of twelve it is not."""
+    best = fitted("soil-layer", (0.5, 0.7, 0.9, 0.6, 0.9, 0.6))
+    others = [fitted("guide-friction", SOME)] * 11
+    for rivals, verdict in (([], "unexplained"), (others, "no-mismatch")):
+        _, said = verdict_on_single_effect(PROBLEM, explanation(SOME, best, *rivals), GROUPS)
+        assert said == verdict
 
 
 def test_rivals_akin_or_within_the_discrepancy_are_kept() -> None:

@@ -21,6 +21,7 @@ from rollover.recording import Recording
 from rollover.recording.importers import read_recording, write_recording
 from rollover.scenario import load
 from rollover.spec.document import find
+from rollover.system.errors import Fault, InputError
 from tests.rollover.diagnosed import nothing_found, sensor_at_fault
 
 SPEEDS = (1.0, 2.0, 3.0)
@@ -254,6 +255,21 @@ def test_what_is_no_share_no_channel_or_no_recording_is_one_line(
     assert found.exit_code == 2
     assert said in found.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("words", "asked"), [((), None), (("--estimate",), True), (("--no-estimate",), False)])
+def test_nothing_said_of_an_estimate_is_neither_yes_nor_no(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], asked: bool | None
+) -> None:
+    seen: list[bool | None] = []
+
+    def diagnosed(*_: object, estimate: bool | None, **__: object) -> None:
+        seen.append(estimate)
+        raise InputError(Fault(message="enough"))
+
+    monkeypatch.setattr("rollover.diagnosis.sensors_first.diagnosed", diagnosed)
+    assert rollover("diagnose", "drop_test", folder, "--out", tmp_path / "out", *words).exit_code == 2
+    assert seen == [asked]
 
 
 def test_shares_by_channel_leave_the_others_to_the_general_one() -> None:

@@ -70,13 +70,15 @@ def diagnose(
         ),
     ] = None,
     estimate: Annotated[
-        bool,
+        bool | None,
         typer.Option(
             "--estimate/--no-estimate",
-            help="Where nothing explains the recordings beside their noise, estimate how far the model misses by "
-            "itself, and diagnose again beside that.",
+            help="How far the model misses by itself is estimated where nothing explains the recordings beside their "
+            "noise, and they are diagnosed again beside that; with --estimate what it makes doubtful is not named "
+            "either, with --no-estimate it is not estimated.",
+            show_default="where nothing is stated",
         ),
-    ] = False,
+    ] = None,
     set_: Setting = None,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
@@ -155,7 +157,7 @@ def diagnose(
     notebook = notes(folder)
     about_fits = json.dumps([about, results.versions()], sort_keys=True)
     words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, tolerance, reference, set_, profile)]
-    words += ["--estimate"] * estimate
+    words += {None: [], True: ["--estimate"], False: ["--no-estimate"]}[estimate]
     with Executor(workers, notebook, about_fits) as executor:
         found = diagnosed(
             chosen,
