@@ -67,9 +67,7 @@ def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Group
     if not found.parts or found.parts[0].p_value > SETTINGS.inference.lack_of_fit.p_value:
         return found.refused(), nothing
     whole, _ = shares(problem, found, groups)
-    # the best of many surely predicts a part of any background by the interval of one alone
-    part = share_of(problem, found.base, found.fitted, groups, among=len(found.parts[0].rivals))
-    if part is not None and part.low > 0.0:
+    if whole is not None and whole.low > 0.0:
         nothing = "unexplained"
     families = {f.candidates[-1].family for f in confusion(found.parts[0], groups, problem.samples_per_error)}
     is_enough = (

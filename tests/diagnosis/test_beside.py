@@ -95,15 +95,6 @@ def test_an_effect_is_named_where_it_predicts_half_else_forgiven(
     assert bool(found.parts) == (verdict == "missing-physics")
 
 
-def test_the_best_of_many_predicts_some_by_chance() -> None:
-    """Low end of the interval of one alone above zero; of the best of twelve it is not."""
-    best = fitted("soil-layer", (0.5, 0.7, 0.9, 0.6, 0.9, 0.6))
-    others = [fitted("guide-friction", SOME)] * 11
-    for rivals, verdict in (([], "unexplained"), (others, "no-mismatch")):
-        _, said = verdict_on_single_effect(PROBLEM, explanation(SOME, best, *rivals), GROUPS)
-        assert said == verdict
-
-
 def test_rivals_akin_or_within_the_discrepancy_are_kept() -> None:
     best = fitted("soil-layer", (0.5,) * DROPS)
     rivals = {

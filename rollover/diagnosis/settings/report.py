@@ -27,8 +27,6 @@ class Grades:
     # share of the mismatch that the true effects explain at least; what resembles an unlisted effect leaves more;
     # chosen
     nearly_all: float = 0.95
-    # share of a channel's range: usual discrepancy of a model; about the median of `inference.discrepancy`
-    usual_discrepancy: float = 0.03
     one_sided_confidence: float = 0.975  # probability: one side of a 95 % interval; definition
 
 
