@@ -158,9 +158,10 @@ def cases(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[st
     return map(make, plan(count, seed, kinds, effects))
 
 
-def drops(order: Order) -> int:
-    """How many drops a case has, without making it."""
-    return len(_begun(order)[1].shots)
+def extent(order: Order) -> tuple[int, int]:
+    """How many drops a case has, and about how many samples in all, without making it."""
+    held = _begun(order)[1]
+    return len(held.shots), len(held.channels) * round(sum((s.end - s.start) * s.rate for s in held.shots))
 
 
 def _begun(order: Order) -> tuple[np.random.Generator, Campaign]:

@@ -13,7 +13,7 @@ import pytest
 from rollover.proof import campaign
 from rollover.proof.background import Background, background, drawn_share, unsized
 from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, PLACE, SPEED
-from rollover.proof.generator import Case, Order, drops, make, plan
+from rollover.proof.generator import Case, Order, extent, make, plan
 from rollover.proof.readings import measured, rig_of, span
 from rollover.proof.reference_solver import CHANNELS, LOADING, Descent, descend
 from rollover.proof.rig import Rig, loading_curve
@@ -155,12 +155,15 @@ def test_every_case_has_one_where_one_is_asked_for() -> None:
 
 @pytest.mark.parametrize(("kind", "called"), [("null", "background"), ("unlisted", "outside")])
 def test_a_benchmark_is_of_six_drops_known_before_they_are_made(kind: str, called: str) -> None:
-    (case,) = bench.cases(1, 5, kind, 0.03, own=False)
+    (case,) = bench.cases(1, 5, kind, 0.03, own=False, most=12000)
     assert case.truth["kind"] == called
     assert case.truth["background"]["share"] == 0.03
     assert len(case.recordings) == bench.DROPS
-    index = case.truth["index"]
-    assert all(drops(order) != bench.DROPS for order in plan(8, 5, [called], (), 0.03)[:index])
+    samples = sum(np.isfinite(r[c]).sum() for r in case.recordings for c in r.channels)
+    *before, own = plan(bench.PLANNED, 5, [called], (), 0.03)[: case.truth["index"] + 1]
+    assert extent(own) == (6, pytest.approx(samples, rel=0.02))
+    assert samples < 12000
+    assert not any(drops == 6 and many < 12000 for drops, many in map(extent, before))
 
 
 @pytest.mark.parametrize(
