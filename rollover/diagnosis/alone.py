@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import with_time_shift_search
 from rollover.diagnosis.fit.step import Groups, Step
-from rollover.diagnosis.grades import share_of, shares
+from rollover.diagnosis.grades import share_beyond, share_of, shares
 from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.inference.residual_law import fitted_law
@@ -42,6 +43,10 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
         problem, first, mismatch_of(problem.dataset, first.fitted.blocks, phases), phases
     )
     first = first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map)
+    leader = best_predictor(problem, first, groups)
+    if leader is not first.fitted:
+        first = replace(first, fitted=leader).cross_validated(problem, groups, inquiry.executor.parallel_map)
+        left = mismatch_of(problem.dataset, first.fitted.blocks, phases)
     return Explanation(
         base=first.base,
         fitted=first.fitted,
@@ -52,6 +57,17 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
         after=left,
         first=first,
     )
+
+
+def best_predictor(problem: Problem, one: Step, groups: Groups) -> Fitted:
+    """The fit that leads a step: its best, unless another predicts surely more of what conditions held out miss.
+
+    Simplicity prefers what is hardly worse by the errors of samples; conditions are what tells beside a discrepancy.
+    """
+    able = [f for f in one.rivals if not ends_at_bound(f)]
+    ahead = min(able, key=lambda f: held_out(f, groups).left.sum(), default=one.fitted)
+    more = share_beyond(problem, one.base, one.fitted, ahead, groups)
+    return one.fitted if more is None or more.low <= 0.0 else ahead
 
 
 def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:

@@ -42,10 +42,15 @@ def shares(problem: Problem, found: Explanation, groups: Groups) -> tuple[Share 
 
 def share_of(problem: Problem, base: Fitted, fitted: Fitted, groups: Groups) -> Share | None:
     """Share of the held-out mismatch of a base that a fit explains, (D20); None where noise leaves as much."""
+    return share_beyond(problem, base, base, fitted, groups)
+
+
+def share_beyond(problem: Problem, base: Fitted, one: Fitted, other: Fitted, groups: Groups) -> Share | None:
+    """Share of the held-out mismatch of a base that another fit explains beyond one, as `share_of`."""
     due = _due(problem, base, groups)
     if float(np.sum(due)) <= 0.0:
         return None
-    return jackknifed(held_out(base, groups).left - held_out(fitted, groups).left, due, groups)
+    return jackknifed(held_out(one, groups).left - held_out(other, groups).left, due, groups)
 
 
 def _due(problem: Problem, base: Fitted, groups: Groups) -> Array:
