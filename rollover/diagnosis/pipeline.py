@@ -24,7 +24,7 @@ from rollover.diagnosis.invariants import checked
 from rollover.diagnosis.late_clocks import with_clock_finding
 from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.reported import reported
-from rollover.diagnosis.result import Diagnosis
+from rollover.diagnosis.result import Diagnosis, Estimate
 from rollover.diagnosis.selection.decision import Explanation
 from rollover.recording import Recording
 from rollover.recording.attitude import continuous
@@ -39,7 +39,7 @@ def diagnose(
     hold_out: Sequence[str] = (),
     tolerance: float | Mapping[str, float] = 0.0,
     reference: Sequence[str] = (),
-    estimate: bool | None = None,
+    estimate: Estimate = False,
     say: Callable[[str], None] = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:
@@ -48,9 +48,10 @@ def diagnose(
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
     out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss
     it, of all or by channel: what is smaller counts as noise. `reference` names recordings of the same rig in which
-    nothing is suspected: they teach how far it misses, and are not diagnosed. Where neither is stated and nothing
-    explains the recordings, that is estimated (see `inference.discrepancy`), and the answer beside it is given where it
-    says more. With `estimate` what such an estimate makes doubtful is not named either; if that is False nothing is.
+    nothing is suspected: they teach how far it misses, and are not diagnosed. With `estimate` that is estimated where
+    nothing explains the recordings (see `inference.discrepancy`), and the answer beside it is given where it says more:
+    if it is "unexplained" in place of that verdict alone, where neither of the others is stated; if it is True what
+    the estimate makes doubtful is not named either.
     `executor` works off the fits, in children if it has any; the answer is the same. Raises `InputError` for an
     unknown condition, a clock that nothing tells the zero of, and recordings without any channel that is simulated;
     ``ValueError`` for a name in `hold_out` or `reference` that is none, a tolerance outside 0 to 1.
@@ -84,7 +85,7 @@ def diagnose(
         say=say,
         executor=executor,
         began=began,
-        estimates=bool(estimate),
+        estimates=estimate is True,
     )
     if reference:
         every, learned = _learned_from_references(scenario, every, reference)
@@ -103,8 +104,8 @@ def diagnose(
         # beside a factor so large what else is missing may be out of sight
         other = _diagnosed(asked, without_inconsistent(every, [*some, *shared]), [*some, *shared, *wrong], notes)
         found = other if other.effects else found
-    is_stated = estimate is not None or bool(reference or stated) or general > 0.0
-    if found.verdict == "unexplained" and not is_stated and isinstance(first, Conclusion):
+    is_open = estimate == "unexplained" and not (reference or stated or general > 0.0)
+    if found.verdict == "unexplained" and is_open and isinstance(first, Conclusion):
         found = _second_opinion(first, usable, notes) or found
     return checked(replace(found, clocks=zeros, seconds=clock.perf_counter() - began))
 
