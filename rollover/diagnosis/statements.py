@@ -133,7 +133,7 @@ def background(shares: Mapping[str, float]) -> str:
 
 
 def by_share(effects: Sequence[Named], scales: Mapping[str, float], *, estimated: bool = True) -> str:
-    """What a sentence goes on with where effects are a part of it, have not quite its form, or stand in a background.
+    """What a sentence goes on with where effects are a part of it, or have not quite its form.
 
     `scales` are shares of the channels' ranges, `estimated` from what explanations leave, else stated or taught.
     """
@@ -144,7 +144,7 @@ def by_share(effects: Sequence[Named], scales: Mapping[str, float], *, estimated
         share, low, high = (max(v, 0.0) for v in (e.explains.share, e.explains.low, e.explains.high))
         form = "; in another form, or beside more" if e.answer == "likeness" and scales else ""
         said += f" {e.id} explains {share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch{form}."
-    if effects and scales:
+    if found and scales:
         how = "estimated" if estimated else "allowed for"
         said += f" A background was {how} beside it (1 sigma, of the range: {background(scales)})."
     return said
