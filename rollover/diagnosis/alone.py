@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import with_time_shift_search
 from rollover.diagnosis.fit.step import Groups, Step
-from rollover.diagnosis.grades import share_of, shares
+from rollover.diagnosis.grades import share_beyond, share_of, shares
 from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.inference.residual_law import fitted_law
@@ -42,6 +43,10 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
         problem, first, mismatch_of(problem.dataset, first.fitted.blocks, phases), phases
     )
     first = first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map)
+    leader = best_predictor(problem, first, groups)
+    if leader is not first.fitted:
+        first = replace(first, fitted=leader).cross_validated(problem, groups, inquiry.executor.parallel_map)
+        left = mismatch_of(problem.dataset, first.fitted.blocks, phases)
     return Explanation(
         base=first.base,
         fitted=first.fitted,
@@ -54,18 +59,32 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
     )
 
 
+def best_predictor(problem: Problem, one: Step, groups: Groups) -> Fitted:
+    """The fit that leads a step: its best, unless another predicts surely more of what conditions held out miss.
+
+    Simplicity prefers what is hardly worse by the errors of samples; conditions are what tells beside a discrepancy.
+    """
+    able = [f for f in one.rivals if not ends_at_bound(f)]
+    ahead = min(able, key=lambda f: held_out(f, groups).left.sum(), default=one.fitted)
+    more = share_beyond(problem, one.base, one.fitted, ahead, groups)
+    return one.fitted if more is None or more.low <= 0.0 else ahead
+
+
 def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:
     """The verdict on what one effect explains beside a discrepancy.
 
     An effect predicts recordings that were held out, a discrepancy does not carry over to them but for what is common
     to all. So it is named where it predicts half of what the scenario misses there, surely some of it, and leaves no
-    more than the discrepancy; or surely half, and its family is not to be mistaken. Otherwise nothing is said to be
-    there where the scenario alone leaves no more than the discrepancy.
+    more than the discrepancy; or surely more than a discrepancy lends itself to, and its family is not to be mistaken.
+    Otherwise nothing is said to be there where the scenario alone leaves no more than the discrepancy, unless a part
+    of that is surely predicted: something is there then that no name fits.
     """
     nothing: Verdict = "no-mismatch" if is_tolerated(problem, found.base) else "unexplained"
     if not found.parts or found.parts[0].p_value > SETTINGS.inference.lack_of_fit.p_value:
         return found.refused(), nothing
     whole, _ = shares(problem, found, groups)
+    if whole is not None and whole.low > 0.0:
+        nothing = "unexplained"
     families = {f.candidates[-1].family for f in confusion(found.parts[0], groups, problem.samples_per_error)}
     is_enough = (
         whole is not None
@@ -73,7 +92,9 @@ def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Group
         and whole.low > 0.0
         and is_tolerated(problem, found.fitted)
     )
-    is_sure = whole is not None and whole.low >= TUNING.half_share and len(families) == 1
+    is_sure = (
+        whole is not None and whole.share >= TUNING.half_share and whole.low > TUNING.sure_share and len(families) == 1
+    )
     if is_enough or is_sure:
         return found, kind_of(found.fitted.candidates[-1])
     return found.refused(), nothing

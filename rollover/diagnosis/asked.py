@@ -11,7 +11,7 @@ from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.own_model import ForwardModel, diagnose_model, load_model
 from rollover.diagnosis.own_model.declaration import declared
 from rollover.diagnosis.own_model.tables import tables
-from rollover.diagnosis.result import Diagnosis
+from rollover.diagnosis.result import Diagnosis, Estimate
 from rollover.scenario import Scenario, given
 from rollover.system.arguments import listed, within
 from rollover.system.errors import Fault, InputError
@@ -24,7 +24,7 @@ def diagnosed(
     hold_out: str | Sequence[str],
     tolerance: float | Mapping[str, float],
     reference: str | Sequence[str],
-    estimate: bool,
+    estimate: Estimate,
     profile: str | Path | None,
     workers: int,
 ) -> Diagnosis:

@@ -201,13 +201,14 @@ def weighed(
     explanation, effects, kept = named_so
     effects = clear_of_null(problem, explanation, effects) if asked.estimates else effects
     found = list(problem.dataset)
-    if asked.estimates and verdict == "unexplained" and is_noise_alone(problem, explanation, groups):
+    # beside a discrepancy what is met is no more than that and noise: what is surely predicted all the same is more
+    is_open = asked.estimates and verdict == "unexplained" and not is_beside
+    if is_open and is_noise_alone(problem, explanation, groups):
         verdict = "no-mismatch"
         notes.append(AS_NOISE)
-    scales = asked.discrepancy.scales if asked.discrepancy is not None and is_beside else {}
     enough = is_tolerated if is_beside else partial(is_enough, left=explanation.after)
     left = not enough(problem, explanation.fitted)
-    grade, effects = graded(*with_shares(problem, explanation, effects, groups), scales, remains=left)
+    grade, effects = graded(*with_shares(problem, explanation, effects, groups), is_beside=is_beside, remains=left)
     slight = effects if asked.estimates and grade == "immaterial" else ()
     if asked.estimates and (slight or (effects and grade == "unexplained")):
         verdict, effects, explanation = "no-mismatch" if slight else "unexplained", (), explanation.refused()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,10 +42,15 @@ def shares(problem: Problem, found: Explanation, groups: Groups) -> tuple[Share 
 
 def share_of(problem: Problem, base: Fitted, fitted: Fitted, groups: Groups) -> Share | None:
     """Share of the held-out mismatch of a base that a fit explains, (D20); None where noise leaves as much."""
+    return share_beyond(problem, base, base, fitted, groups)
+
+
+def share_beyond(problem: Problem, base: Fitted, one: Fitted, other: Fitted, groups: Groups) -> Share | None:
+    """Share of the held-out mismatch of a base that another fit explains beyond one, as `share_of`."""
     due = _due(problem, base, groups)
     if float(np.sum(due)) <= 0.0:
         return None
-    return jackknifed(held_out(base, groups).left - held_out(fitted, groups).left, due, groups)
+    return jackknifed(held_out(one, groups).left - held_out(other, groups).left, due, groups)
 
 
 def _due(problem: Problem, base: Fitted, groups: Groups) -> Array:
@@ -136,21 +141,17 @@ def is_immaterial(effect: Named) -> bool:
 
 
 def graded(
-    effects: Sequence[Named], whole: Share | None, scales: Mapping[str, float], *, remains: bool
+    effects: Sequence[Named], whole: Share | None, *, is_beside: bool, remains: bool
 ) -> tuple[Answer, tuple[Named, ...]]:
-    """The answer, and the effects with theirs; `scales` is a discrepancy that was estimated, `remains` what is left.
+    """The answer, and the effects with theirs; `is_beside` an estimated discrepancy, `remains` says if more is left.
 
-    Whole: noise is left, or beside it no more than models usually miss and surely nearly nothing of what there was.
-    Likeness: its family cannot be told from another, or its form is not quite that of the recordings. Part: structure
-    is left that is more.
+    Whole: noise is left. Likeness: its family cannot be told from another, or beside a discrepancy, where more than
+    noise is left, so that its form is not quite that of the recordings. Part: structure is left that is more.
     """
     if effects and all(is_immaterial(e) for e in effects):
         return "immaterial", tuple(replace(e, answer="immaterial") for e in effects)
     if remains and whole is not None and whole.share < TUNING.half_share:
         return "unexplained", tuple(replace(e, answer="unexplained") for e in effects)
     alike = any(e.indistinguishable_from for e in effects)
-    bent = bool(scales) and (
-        max(scales.values()) > TUNING.usual_discrepancy or whole is None or whole.low < TUNING.nearly_all
-    )
-    answer: Answer = "part" if remains else "likeness" if alike or bent else "whole"
+    answer: Answer = "part" if remains else "likeness" if alike or is_beside else "whole"
     return answer, tuple(replace(e, answer="immaterial" if is_immaterial(e) else answer) for e in effects)

@@ -24,7 +24,7 @@ from rollover.diagnosis.invariants import checked
 from rollover.diagnosis.late_clocks import with_clock_finding
 from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.reported import reported
-from rollover.diagnosis.result import Diagnosis
+from rollover.diagnosis.result import Diagnosis, Estimate
 from rollover.diagnosis.selection.decision import Explanation
 from rollover.recording import Recording
 from rollover.recording.attitude import continuous
@@ -39,7 +39,7 @@ def diagnose(
     hold_out: Sequence[str] = (),
     tolerance: float | Mapping[str, float] = 0.0,
     reference: Sequence[str] = (),
-    estimate: bool = False,
+    estimate: Estimate = False,
     say: Callable[[str], None] = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:
@@ -49,7 +49,9 @@ def diagnose(
     out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss
     it, of all or by channel: what is smaller counts as noise. `reference` names recordings of the same rig in which
     nothing is suspected: they teach how far it misses, and are not diagnosed. With `estimate` that is estimated where
-    nothing explains the recordings otherwise (see `inference.discrepancy`), and what it makes doubtful is not named.
+    nothing explains the recordings (see `inference.discrepancy`), and the answer beside it is given where it says more:
+    if it is "unexplained" in place of that verdict alone, where neither of the others is stated; if it is True what
+    the estimate makes doubtful is not named either.
     `executor` works off the fits, in children if it has any; the answer is the same. Raises `InputError` for an
     unknown condition, a clock that nothing tells the zero of, and recordings without any channel that is simulated;
     ``ValueError`` for a name in `hold_out` or `reference` that is none, a tolerance outside 0 to 1.
@@ -83,7 +85,7 @@ def diagnose(
         say=say,
         executor=executor,
         began=began,
-        estimates=estimate,
+        estimates=estimate is True,
     )
     if reference:
         every, learned = _learned_from_references(scenario, every, reference)
@@ -95,30 +97,44 @@ def diagnose(
     some, shared = find_inconsistencies(every)
     wrong = wrong_conditions([e for e in without_inconsistent(every, some) if e.name not in hold_out])
     every = [e for e in every if e.name not in {one.dataset.name for one in wrong}]
-    found = _diagnosed(asked, without_inconsistent(every, some), [*some, *wrong], notes)
+    usable = without_inconsistent(every, some)
+    first = concluded(asked, usable, [*some, *wrong], notes)
+    found = _answered(first, usable, notes)
     if found.verdict == "unexplained" and shared:
         # beside a factor so large what else is missing may be out of sight
         other = _diagnosed(asked, without_inconsistent(every, [*some, *shared]), [*some, *shared, *wrong], notes)
         found = other if other.effects else found
+    is_open = estimate == "unexplained" and not (reference or stated or general > 0.0)
+    if found.verdict == "unexplained" and is_open and isinstance(first, Conclusion):
+        found = _second_opinion(first, usable, notes) or found
     return checked(replace(found, clocks=zeros, seconds=clock.perf_counter() - began))
 
 
 def _diagnosed(
     asked: Asked, every: Sequence[Dataset], inconsistencies: Sequence[Aside], notes: Sequence[str]
 ) -> Diagnosis:
-    """The diagnosis of recordings without what was left aside.
+    """The diagnosis of recordings without what was left aside."""
+    return _answered(concluded(asked, every, inconsistencies, notes), every, notes)
 
-    What nothing explains beside its noise may be explained by clocks, or beside a discrepancy.
+
+def _answered(found: Conclusion | Diagnosis, every: Sequence[Dataset], notes: Sequence[str]) -> Diagnosis:
+    """The answer that a conclusion gives, or where a discrepancy is to be estimated that beside it, if it says more.
+
+    What is named and leaves structure is held against no more than noise as well.
     """
-    found = concluded(asked, every, inconsistencies, notes)
     if isinstance(found, Diagnosis):
         return found
-    # what is named and leaves structure is held against no more than noise as well
-    if asked.estimates and found.shown is None and (found.verdict == "unexplained" or found.grade == "part"):
-        other = _with_clocks_corrected(found, every, notes) or _beside_estimated_discrepancy(found, every, notes)
-        if other is not None:
-            return other
+    if found.asked.estimates and (found.verdict == "unexplained" or found.grade == "part"):
+        return _second_opinion(found, every, notes) or reported(found)
     return reported(found)
+
+
+def _second_opinion(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]) -> Diagnosis | None:
+    """What clocks, or an effect beside a discrepancy, say of recordings that nothing explains beside their noise."""
+    if found.shown is not None:
+        return None
+    found = replace(found, asked=replace(found.asked, estimates=True))
+    return _with_clocks_corrected(found, every, notes) or _beside_estimated_discrepancy(found, every, notes)
 
 
 def _beside_estimated_discrepancy(

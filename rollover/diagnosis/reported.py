@@ -67,6 +67,7 @@ def reported(c: Conclusion) -> Diagnosis:
         asked.say("a law for the unexplained residual")
         law = proposed(problem, explanation.base, set_ups, found, groups)
     told_of = {} if asked.discrepancy is None else asked.discrepancy.scales_by_channel(found)
+    shares = {} if asked.discrepancy is None else {k: asked.discrepancy.scales[k] for k in told_of}
     detectable = dict(explanation.detectable)
     contrary = inconsistent_repeats(found, SETTINGS.data.repeatability.contradiction)
     if verdict == "no-mismatch" and not c.slight and (contrary or is_weak(detectable)):
@@ -96,7 +97,7 @@ def reported(c: Conclusion) -> Diagnosis:
             if shown is not None
             else immaterial_sentence(c.slight)
             if c.slight
-            else usual_model_error_sentence(asked.discrepancy.by_none, explanation.p_value, len(found), _most(c))
+            else usual_model_error_sentence(asked.discrepancy.scales, explanation.p_value, len(found), _most(c))
             if verdict == "no-mismatch" and asked.discrepancy is not None and c.is_beside
             else sentence(
                 verdict,
@@ -113,7 +114,7 @@ def reported(c: Conclusion) -> Diagnosis:
         )
         + (closest_candidate_sentence(explanation, groups) if verdict == "unexplained" and shown is None else "")
         + (clock_evidence(clock_outliers(problem, explanation.fitted, executor.parallel_map)) if is_left else "")
-        + (by_share(effects, told_of) if shown is None else "")
+        + (by_share(effects, shares, estimated=c.is_beside) if shown is None else "")
         + offered(law)
         + inconsistency_evidence(c.inconsistencies)
         + contradiction_clause(verdict, contrary)

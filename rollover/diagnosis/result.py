@@ -11,6 +11,9 @@ from rollover.system.notebook import card
 
 Verdict = Literal["no-mismatch", "parameter", "sensor", "missing-physics", "unexplained", "cannot-tell"]
 
+# whether how far a model misses is estimated: "unexplained" says in place of that verdict alone
+Estimate = bool | Literal["unexplained"]
+
 Answer = Literal["nothing", "immaterial", "whole", "part", "likeness", "unexplained", "cannot-tell"]
 
 

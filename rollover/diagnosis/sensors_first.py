@@ -10,7 +10,7 @@ from rollover.assessment import results
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.pipeline import diagnose
-from rollover.diagnosis.result import Diagnosis
+from rollover.diagnosis.result import Diagnosis, Estimate
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from rollover.recording.checks import Finding, prechecks, shared_rails
@@ -52,7 +52,7 @@ def diagnosed(
     hold_out: Sequence[str] = (),
     tolerance: float | Mapping[str, float] = 0.0,
     reference: Sequence[str] = (),
-    estimate: bool = False,
+    estimate: Estimate = False,
     say: Callable[[str], None] = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:

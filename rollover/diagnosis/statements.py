@@ -15,11 +15,11 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
-from rollover.diagnosis.result import Considered, Named, Place, Scale, Share, Verdict
+from rollover.diagnosis.result import Considered, Named, Place, Share, Verdict
 from rollover.diagnosis.selection.decision import Explanation, strongest
 from rollover.diagnosis.selection.forward_step import confusion
 from rollover.diagnosis.settings import SETTINGS
-from rollover.effects import EFFECTS, spoken
+from rollover.effects import EFFECTS
 
 TUNING = SETTINGS.report.statements
 
@@ -127,8 +127,16 @@ def immaterial_sentence(effects: Sequence[Named]) -> str:
     return f"Simulation and recordings differ by nothing of consequence: no load moves by more than {moves:.2%}. {said}"
 
 
-def by_share(effects: Sequence[Named], scales: Mapping[str, Scale]) -> str:
-    """What a sentence goes on with where effects are a part of it, or have not quite its form."""
+def background(shares: Mapping[str, float]) -> str:
+    """A discrepancy in words: its shares of the channels' ranges."""
+    return ", ".join(f"{share:.1%} of {channel}" for channel, share in shares.items())
+
+
+def by_share(effects: Sequence[Named], scales: Mapping[str, float], *, estimated: bool = True) -> str:
+    """What a sentence goes on with where effects are a part of it, or have not quite its form.
+
+    `scales` are shares of the channels' ranges, `estimated` from what explanations leave, else stated or taught.
+    """
     found = [e for e in effects if e.explains is not None and e.answer in ("part", "likeness")]
     said = ""
     for e in found:
@@ -137,19 +145,18 @@ def by_share(effects: Sequence[Named], scales: Mapping[str, Scale]) -> str:
         form = "; in another form, or beside more" if e.answer == "likeness" and scales else ""
         said += f" {e.id} explains {share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch{form}."
     if found and scales:
-        each = ", ".join(f"{spoken(s.scale)} {s.unit} of {channel}" for channel, s in scales.items())
-        said += f" What models usually miss beside it is taken to be {each}."
+        how = "estimated" if estimated else "allowed for"
+        said += f" A background was {how} beside it (1 sigma, of the range: {background(scales)})."
     return said
 
 
 def usual_model_error_sentence(
-    left: Mapping[str, float], p_value: float, recordings: int, best: tuple[Candidate, Share] | None = None
+    scales: Mapping[str, float], p_value: float, recordings: int, best: tuple[Candidate, Share] | None = None
 ) -> str:
-    """The sentence where what a scenario leaves, a share of each channel's range, is what models usually miss.
+    """The sentence where all is met but for an estimated background, a share of each channel's range.
 
     `best` is the effect that predicts most of it, with its share, which is told where it surely predicts some.
     """
-    each = ", ".join(f"{share:.1%} of {channel}" for channel, share in left.items())
     some = ""
     if best is not None and best[1].low > 0.0:
         candidate, found = best
@@ -158,9 +165,9 @@ def usual_model_error_sentence(
             f" Part of it is predicted by {candidate.id}{of}: {found.share:.0%} ({found.low:.0%} to {found.high:.0%})."
         )
     return (
-        f"Simulation and {recordings} recordings differ by more than noise, but by no more than models usually miss "
-        f"(root mean square, of the range: {each}), and no effect that could be named predicts half of that on "
-        f"recordings that were held out (p = {p_value:.2g} of noise alone).{some}"
+        f"Simulation and {recordings} recordings agree but for an estimated background (1 sigma, of the range: "
+        f"{background(scales)}): more than noise (p = {p_value:.2g}), no more than models usually miss, and no effect "
+        f"that could be named predicts half of it on recordings that were held out.{some}"
     )
 
 

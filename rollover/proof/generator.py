@@ -158,11 +158,21 @@ def cases(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[st
     return map(make, plan(count, seed, kinds, effects))
 
 
-def make(order: Order) -> Case:
-    """Make one case: the same for the same order, to the last bit."""
+def extent(order: Order) -> tuple[int, int]:
+    """How many drops a case has, and about how many samples in all, without making it."""
+    held = _begun(order)[1]
+    return len(held.shots), len(held.channels) * round(sum((s.end - s.start) * s.rate for s in held.shots))
+
+
+def _begun(order: Order) -> tuple[np.random.Generator, Campaign]:
     random = np.random.default_rng([order.seed, order.index])
     needs = tuple(c for id in order.ids for c in _needs(random, id))
-    held = campaign.draw(random, needs, hard=order.kind == "decoy")
+    return random, campaign.draw(random, needs, hard=order.kind == "decoy")
+
+
+def make(order: Order) -> Case:
+    """Make one case: the same for the same order, to the last bit."""
+    random, held = _begun(order)
     rebounds = order.kind != "negligible" and (order.ids == ("soil-adhesion",) or random.random() < 0.04)
     rebounds = rebounds and "soil-elastic-rebound" not in order.ids
     held = replace(held, rebounds=rebounds)

@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.alone import alike_beside, verdict_on_single_effect
+from rollover.diagnosis.alone import alike_beside, best_predictor, verdict_on_single_effect
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
@@ -73,13 +73,15 @@ SOME = (0.8, 0.9, 1.0, 0.9, 1.0, 0.8)  # of which a discrepancy of unit size lea
     ("base", "left", "p_value", "verdict"),
     [
         (SOME, (0.2, 0.2, 0.3, 0.2, 0.3, 0.2), 1e-9, "missing-physics"),  # three quarters, of each drop
-        (SOME, (0.5, 0.5, 0.6, 0.5, 0.6, 0.5), 1e-9, "no-mismatch"),  # less than half: what drops have in common
+        (SOME, (0.5, 0.5, 0.6, 0.5, 0.6, 0.5), 1e-9, "unexplained"),  # surely some, and less than half: without a name
+        (SOME, (0.3, 0.8, 1.1, 0.9, 0.6, 0.8), 1e-9, "no-mismatch"),  # some, maybe none: what drops have in common
         (SOME, (0.01, 1.2, 0.01, 1.3, 0.01, 0.01), 1e-9, "no-mismatch"),  # half, of some drops alone: maybe none
         (SOME, (0.05, 0.9, 0.1, 1.0, 0.1, 0.05), 1e-9, "missing-physics"),  # three fifths, and surely some of it
         (SOME, (0.2, 0.2, 0.3, 0.2, 0.3, 0.2), 0.2, "no-mismatch"),  # the best of all does as much by chance
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (0.5,) * 6, 1e-9, "missing-physics"),
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (5.0,) * 6, 1e-9, "unexplained"),
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (3.0,) * DROPS, 1e-9, "missing-physics"),  # leaves more, and is surely half
+        ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (3.0, 3.0, 3.0, 5.0, 6.0, 3.0), 1e-9, "missing-physics"),  # surely a third
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (3.0, 3.0, 3.0, 7.0, 7.0, 3.0), 1e-9, "unexplained"),
     ],
 )
@@ -91,6 +93,20 @@ def test_an_effect_is_named_where_it_predicts_half_else_forgiven(
     )
     assert said == verdict
     assert bool(found.parts) == (verdict == "missing-physics")
+
+
+@pytest.mark.parametrize(
+    ("left", "x", "leads"),
+    [
+        ((0.20, 0.22, 0.19, 0.21, 0.20, 0.18), 0.5, "sensor-lag"),  # a tenth more, in each drop
+        ((0.20, 0.22, 0.19, 0.21, 0.20, 0.18), 1.0, "sensor-clock-offset"),  # at an end of its range
+        ((0.10, 0.50, 0.15, 0.45, 0.05, 0.30), 0.5, "sensor-clock-offset"),  # more, maybe by chance of the drops
+    ],
+)
+def test_what_conditions_surely_prefer_leads(left: tuple[float, ...], x: float, leads: str) -> None:
+    simple = fitted("sensor-clock-offset", (0.30, 0.31, 0.29, 0.32, 0.30, 0.28))
+    one = explanation(SOME, simple, fitted("sensor-lag", left, x=x)).parts[0]
+    assert best_predictor(PROBLEM, one, GROUPS).candidates[-1].id == leads
 
 
 def test_rivals_akin_or_within_the_discrepancy_are_kept() -> None:

@@ -51,25 +51,24 @@ def test_a_share_is_of_all_recordings_its_interval_jackknifed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("effects", "whole", "scales", "remains", "answer"),
+    ("effects", "whole", "is_beside", "remains", "answer"),
     [
-        ([effect()], share(0.99), {}, False, "whole"),
-        ([effect()], share(1.0), {FORCE: 0.02}, False, "whole"),  # beside what models usually miss
-        ([effect()], share(1.0), {FORCE: 0.06}, False, "likeness"),
-        ([effect()], share(0.9), {FORCE: 0.02}, False, "likeness"),  # a brake as a layer: its form is another
-        ([effect()], share(0.3), {}, False, "whole"),  # of a faint one noise decides how much it seems to explain
-        ([effect(indistinguishable_from=("soil-inertial-drag",))], share(0.99), {}, False, "likeness"),
-        ([effect()], share(0.8), {}, True, "part"),
-        ([effect()], share(0.4), {}, True, "unexplained"),
-        ([effect(moves=0.004)], share(0.99), {}, False, "immaterial"),
-        ([effect(moves=0.004), effect("mass", "added")], share(0.99), {}, False, "whole"),
-        ([effect("sensor-bias", "bias", kind="sensor", channel=FORCE, moves=None)], share(0.99), {}, False, "whole"),
+        ([effect()], share(0.99), False, False, "whole"),
+        ([effect()], share(1.0), True, False, "likeness"),  # noise alone refutes it: its form is not quite that
+        ([effect()], share(0.9), True, False, "likeness"),  # a brake as a layer: its form is another
+        ([effect()], share(0.3), False, False, "whole"),  # of a faint one noise decides how much it seems to explain
+        ([effect(indistinguishable_from=("soil-inertial-drag",))], share(0.99), False, False, "likeness"),
+        ([effect()], share(0.8), False, True, "part"),
+        ([effect()], share(0.4), False, True, "unexplained"),
+        ([effect(moves=0.004)], share(0.99), False, False, "immaterial"),
+        ([effect(moves=0.004), effect("mass", "added")], share(0.99), False, False, "whole"),
+        ([effect("sensor-bias", "bias", kind="sensor", channel=FORCE, moves=None)], share(0.99), False, False, "whole"),
     ],
 )
 def test_the_answer_says_how_much_of_it_is_explained(
-    effects: list[Named], whole: Share, scales: dict[str, float], remains: bool, answer: str
+    effects: list[Named], whole: Share, is_beside: bool, remains: bool, answer: str
 ) -> None:
-    found, told = graded(effects, whole, scales, remains=remains)
+    found, told = graded(effects, whole, is_beside=is_beside, remains=remains)
     assert found == answer
     assert told[0].answer in (answer, "immaterial")
     assert [e.id for e in told] == [e.id for e in effects]

@@ -261,5 +261,5 @@ def test_the_command_writes_nothing_for_a_model_that_fails(tmp_path: Path) -> No
     assert done.returncode == 0, done.stderr
     assert '"verdict": "no-mismatch"' in done.stdout
     assert '"own.py"' in done.stdout, "the file's hash is stated"
-    for option in ("--estimate", "--set=a=1", "--reference=r1"):
+    for option in ("--estimate", "--second-opinion", "--set=a=1", "--reference=r1"):
         assert outside(*command, option).returncode == 2, option

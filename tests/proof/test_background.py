@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -11,10 +13,12 @@ import pytest
 from rollover.proof import campaign
 from rollover.proof.background import Background, background, drawn_share, unsized
 from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, PLACE, SPEED
-from rollover.proof.generator import Order, make, plan
+from rollover.proof.generator import Case, Order, extent, make, plan
 from rollover.proof.readings import measured, rig_of, span
 from rollover.proof.reference_solver import CHANNELS, LOADING, Descent, descend
 from rollover.proof.rig import Rig, loading_curve
+from tests.benchmarks import background as bench
+from tests.proof.test_score import effect, said, truth
 
 SPEEDS = (1.4, 2.0, 2.7, 3.3)
 RIGS = [Rig(speed=v) for v in SPEEDS]
@@ -147,3 +151,33 @@ def test_every_case_has_one_where_one_is_asked_for() -> None:
             ValueError, match=r"no share of the force's range, got .*; drawn and 0.001 to 0.3 are allowed"
         ):
             plan(3, 1, background=wrong)
+
+
+@pytest.mark.parametrize(("kind", "called"), [("null", "background"), ("unlisted", "outside")])
+def test_a_benchmark_is_of_six_drops_known_before_they_are_made(kind: str, called: str) -> None:
+    (case,) = bench.cases(1, 5, kind, 0.03, own=False, most=12000)
+    assert case.truth["kind"] == called
+    assert case.truth["background"]["share"] == 0.03
+    assert len(case.recordings) == bench.DROPS
+    samples = sum(np.isfinite(r[c]).sum() for r in case.recordings for c in r.channels)
+    *before, own = plan(bench.PLANNED, 5, [called], (), 0.03)[: case.truth["index"] + 1]
+    assert extent(own) == (6, pytest.approx(samples, rel=0.02))
+    assert samples < 12000
+    assert not any(drops == 6 and many < 12000 for drops, many in map(extent, before))
+
+
+@pytest.mark.parametrize(
+    ("id", "kind", "answer", "counted"),
+    [
+        ("soil-crust", "foreign-form", "likeness", {"in the set", "first"}),
+        ("mass", "foreign-form", "whole", {"another name", "that called whole"}),
+        ("soil-layer", "outside", "likeness", set()),  # as it is near: neither found nor wrong
+        ("mass", "outside", "part", {"another name"}),
+    ],
+)
+def test_a_benchmark_counts_names_as_they_are_right(id: str, kind: str, answer: str, counted: set[str]) -> None:
+    true = effect("soil-crust" if kind != "outside" else "outside:edge", "physics" if kind != "outside" else "outside")
+    case = SimpleNamespace(name="a", truth=truth(true | {"near": ["soil-layer"]}, kind=kind) | {"background": {}})
+    answered = said(id) | {"answer": answer, "invariants": {"broken": []}}
+    row = bench.counted(cast(Case, case), answered)
+    assert {what for what in bench.COUNTED if row[what]} == counted

@@ -16,11 +16,13 @@ from rollover.cli.commands.diagnose import tolerances
 from rollover.cli.main import app
 from rollover.diagnosis import Diagnosis, account
 from rollover.diagnosis.overlay import series
+from rollover.diagnosis.result import Estimate
 from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Recording
 from rollover.recording.importers import read_recording, write_recording
 from rollover.scenario import load
 from rollover.spec.document import find
+from rollover.system.errors import Fault, InputError
 from tests.rollover.diagnosed import nothing_found, sensor_at_fault
 
 SPEEDS = (1.0, 2.0, 3.0)
@@ -244,6 +246,7 @@ def test_wrong_input_is_one_line_and_nothing_is_written(
         (("--reference", "v9"), "--reference: no such recording, got 'v9'"),
         (("--reference", "v1", "--hold-out", "v1"), "--reference: held out too, got 'v1'"),
         (("--reference", "v1", "--tolerance", "0.05"), "--reference: beside --tolerance, got both"),
+        (("--second-opinion", "--estimate"), "--second-opinion: beside --estimate, got both; one of them says it"),
         (("--reference", "v1", "--reference", "v2", "--hold-out", "v3"), "--reference: nothing left to fit"),
     ],
 )
@@ -254,6 +257,24 @@ def test_what_is_no_share_no_channel_or_no_recording_is_one_line(
     assert found.exit_code == 2
     assert said in found.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "asked"),
+    [((), False), (("--estimate",), True), (("--second-opinion",), "unexplained"), (("--no-estimate",), False)],
+)
+def test_an_estimate_is_made_as_it_is_asked_for(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], asked: Estimate
+) -> None:
+    seen: list[Estimate] = []
+
+    def diagnosed(*_: object, estimate: Estimate, **__: object) -> None:
+        seen.append(estimate)
+        raise InputError(Fault(message="enough"))
+
+    monkeypatch.setattr("rollover.diagnosis.sensors_first.diagnosed", diagnosed)
+    assert rollover("diagnose", "drop_test", folder, "--out", tmp_path / "out", *words).exit_code == 2
+    assert seen == [asked]
 
 
 def test_shares_by_channel_leave_the_others_to_the_general_one() -> None:

@@ -15,7 +15,12 @@ from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from rollover.diagnosis import Diagnosis
+<<<<<<< HEAD
     from rollover.diagnosis.overlay import Overlay
+=======
+    from rollover.diagnosis.overlay import Told
+    from rollover.diagnosis.result import Estimate
+>>>>>>> real
     from rollover.recording import Recording
 
 MOST_TOLERATED = 0.5  # of a range: what may miss half of it is no model of it
@@ -77,6 +82,13 @@ def diagnose(
             "itself, and diagnose again beside that.",
         ),
     ] = False,
+    second_opinion: Annotated[
+        bool,
+        typer.Option(
+            "--second-opinion",
+            help="Do so only in place of `unexplained`, and where no share is stated: all other answers stay.",
+        ),
+    ] = False,
     set_: Setting = None,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
@@ -93,7 +105,12 @@ def diagnose(
     from rollover.system.processes import begin_server, cores
 
     if model is not None:
-        given = {"--set": set_, "--reference": reference, "--estimate": estimate}
+        given = {
+            "--set": set_,
+            "--reference": reference,
+            "--estimate": estimate,
+            "--second-opinion": second_opinion,
+        }
         _diagnose_model(
             model,
             [scenario, *(recordings or [])],
@@ -137,6 +154,9 @@ def diagnose(
     allowed = tolerances(tolerance or [], measured)
     if taught and allowed:
         raise InputError(Fault(file="--reference", message="beside --tolerance, got both; one of them says it"))
+    if estimate and second_opinion:
+        raise InputError(Fault(file="--second-opinion", message="beside --estimate, got both; one of them says it"))
+    how: Estimate = True if estimate else "unexplained" if second_opinion else False
     folder = out or Path("out", "diagnose", path.stem)
     about: dict[str, Any] = {
         "scenario_hash": document.content_hash(chosen),
@@ -145,7 +165,7 @@ def diagnose(
         "hold_out": held,
         "tolerance": allowed,
         "reference": taught,
-        "estimate": estimate,
+        "estimate": how,
     }
     about["origin"] = results.origin(path, folder, set_ or [])
     results.claim_account(folder, FORMAT, about, FILES, force=force, say=console.say)
@@ -155,7 +175,7 @@ def diagnose(
     notebook = notes(folder)
     about_fits = json.dumps([about, results.versions()], sort_keys=True)
     words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, tolerance, reference, set_, profile)]
-    words += ["--estimate"] * estimate
+    words += ["--estimate"] * estimate + ["--second-opinion"] * second_opinion
     with Executor(workers, notebook, about_fits) as executor:
         found = diagnosed(
             chosen,
@@ -164,7 +184,7 @@ def diagnose(
             hold_out=held,
             tolerance=allowed,
             reference=taught,
-            estimate=estimate,
+            estimate=how,
             say=console.say,
             executor=executor,
         )

@@ -22,11 +22,11 @@ class Grades:
     immaterial: float = 0.01
     load_quantile: float = 0.99  # quantile of a load's change; jumps beyond it depend on a clock; chosen
     half_share: float = 0.5  # share of the mismatch: the least that is called a part of it; chosen
+    # share of the mismatch: low end above which an effect is surely half of what it leaves, s/(1 - s) > 1/2
+    sure_share: float = 1.0 / 3.0
     # share of the mismatch that the true effects explain at least; what resembles an unlisted effect leaves more;
     # chosen
     nearly_all: float = 0.95
-    # share of a channel's range: usual discrepancy of a model; about the median of `inference.discrepancy`
-    usual_discrepancy: float = 0.03
     one_sided_confidence: float = 0.975  # probability: one side of a 95 % interval; definition
 
 
