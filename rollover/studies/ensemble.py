@@ -149,7 +149,8 @@ def with_scatter(
     Raises `FailedRunError` if one of them fails.
     """
     ensemble = [{(p.channel, f"CFC {p.cfc}"): p.filtered for p in peaks}]
-    for outcome in map_cases(measured, neighbours(scenario, starts)[1:], workers=workers):
+    others = [s.of_many() for s in neighbours(scenario, starts)[1:]]
+    for outcome in map_cases(measured, others, workers=workers):
         if outcome.value is None:
             assert outcome.failure is not None
             raise FailedRunError(f"neighbouring start {outcome.index + 2} of {starts}: {outcome.failure.sentence}")

@@ -125,7 +125,7 @@ def compared(
             faults += e.faults
             continue
         known[file] = (found, scenario)
-        starts += [Start(file=file, scenario=s, half_step=False) for s in neighbours(scenario, found.starts)]
+        starts += [Start(file=file, scenario=s, half_step=False) for s in starts_of(scenario, found.starts)]
     if faults:
         raise InputError(*faults)
     outcomes = _worked_off(starts, workers, time_limit, show)
@@ -174,7 +174,7 @@ def updated(
             answers.append(answer)
             continue
         known[file] = scenario = load(file)
-        for again in neighbours(scenario, baselines.STARTS):
+        for again in starts_of(scenario, baselines.STARTS):
             half = again.replaced({"simulation.step": 0.5 * scenario.simulation.step})
             starts += [
                 Start(file=file, scenario=again, half_step=False),
@@ -240,6 +240,12 @@ def _without_runs(file: Path) -> tuple[Answer | None, Path]:
         f"or {baselines.FOLDER}/{baselines.EXCLUDED} says why there is none"
     )
     return Answer(scenario=file.stem, verdict="missing", sentence="no baseline", notes=(advice,)), path
+
+
+def starts_of(scenario: Scenario, count: int) -> list[Scenario]:
+    """The scenario as a single run has it, and its neighbours as those of many runs."""
+    own, *others = neighbours(scenario, count)
+    return [own, *(other.of_many() for other in others)]
 
 
 def _work(start: Start) -> Observed:

@@ -195,11 +195,11 @@ def test_a_file_that_asks_for_it_on_a_stand_is_told_the_line(tmp_path: Path) -> 
 def test_the_key_at_its_default_changes_no_hash() -> None:
     scenario = load("drop_test")
     mapping = to_mapping(scenario)
-    assert (mapping["simulation"].pop("integrator"), mapping.pop("inputs")) == ("exudyn", [])
+    assert (mapping["simulation"].pop("integrator"), mapping.pop("inputs")) == ("auto", [])
     assert to_mapping(scenario, hashed=True) == mapping
     compiled = scenario.replaced({"simulation.integrator": "compiled"})
     assert content_hash(compiled) != content_hash(scenario)
-    assert content_hash(compiled.replaced({"simulation.integrator": "exudyn"})) == content_hash(scenario)
+    assert content_hash(compiled.replaced({"simulation.integrator": "auto"})) == content_hash(scenario)
 
 
 def test_results_say_which_integrator_made_them() -> None:

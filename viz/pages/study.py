@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.assessment.ledger import of_cases
-from rollover.studies import failures
+from rollover.studies import failures, reference
 from rollover.studies.runner import Conducted
 from rollover.studies.study import Study
 from rollover.studies.summary import values_of
@@ -41,6 +41,8 @@ def page(study: Study, done: Conducted, account: Mapping[str, Any], *, command: 
         blocks.append(_worst(account["worst"]))
     if said := failures.sentence(account["failures_along"]):
         blocks.insert(0, Note(text=f"{said}.", warning=True))
+    if said := reference.sentence(account.get("reference_check")):
+        blocks.append(Note(text=f"Integrator: {account['integrator']}. {said}."))
     if count := account["from_rest"]:
         blocks.append(Note(text=f"{count} cases had no static balance on their surface and began from rest."))
     if (ledger := account.get("ledger")) and ledger["open"]:
