@@ -292,7 +292,7 @@ class RunSimulator:
     def _making(self, chosen: Scenario, changes: Mapping[str, Any]) -> Making:
         physical = {name: e for name, e in chosen.effects.items() if not name.startswith(SENSORS)}
         stems = frozenset(name[:-1] for name in self.recording.channels)  # the axes across, for a sensor that is turned
-        return Making(_key(changes), replace(chosen, effects=physical).of_many(), stems, self._limit)
+        return Making(_key(changes), replace(chosen, effects=physical), stems, self._limit)
 
     def _run(self, chosen: Scenario, changes: Mapping[str, Any]) -> tuple[Scenario, Recording] | None:
         """The run before instruments, with the scenario as its effects made it; None if it failed."""
