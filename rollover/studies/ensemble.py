@@ -160,5 +160,5 @@ def with_scatter(
         values = [start[peak.channel, f"CFC {peak.cfc}"] for start in ensemble]
         mean = statistics.fmean(values)
         scatter = statistics.stdev(values) / mean if mean > 0.0 else 0.0
-        found.append(replace(peak, starts=starts, mean=mean, scatter=scatter))
+        found.append(replace(peak, starts=starts, mean=mean, scatter=scatter, starts_by=others[0].integrator))
     return tuple(found)

@@ -253,7 +253,9 @@ def _work(start: Start) -> Observed:
 
 
 def _with_ledger(answer: Answer, outcomes: Sequence[Outcome[Start, Observed]]) -> Answer:
-    """The answer with the largest residual of the energy ledger in any run, and a note where it is too large."""
+    """The answer with who made the runs, and the largest residual of their ledgers; a note where it is too large."""
+    made = dict.fromkeys(o.case.scenario.integrator for o in outcomes)
+    answer = replace(answer, integrators=", ".join(made))
     found = [o.value.ledger for o in outcomes if o.value is not None and math.isfinite(o.value.ledger.largest)]
     if not found:
         return answer

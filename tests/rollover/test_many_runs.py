@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import statistics
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -20,9 +21,12 @@ from rollover.scenario import load
 from rollover.spec.document import content_hash, shipped_folder
 from rollover.studies import case_store, reference, regression
 from rollover.studies.carry_out import prepared
-from rollover.studies.ensemble import with_scatter
-from rollover.studies.runner import Conducted, Way, conduct
+from rollover.studies.case import _simulated
+from rollover.studies.ensemble import neighbours, with_scatter
+from rollover.studies.plan import Random
+from rollover.studies.runner import Builder, Conducted, Way, conduct
 from rollover.system.errors import InputError
+from tests.physics.test_integrators import STARTS, WITHIN
 from tests.rollover.studies import drops, made_up
 
 FULL = ("simulator: drop", "simulator: full")
@@ -115,6 +119,24 @@ def test_workers_change_no_bit_of_the_answer(tmp_path: Path) -> None:
     assert checks[0] == checks[1] == checks[2]
 
 
+def test_overturns_of_a_study_are_exudyn_s_within_their_scatter(tmp_path: Path) -> None:
+    """Each response of each case: Exudyn's is one more draw beside the case and its neighbours, by Student's t."""
+    coarse = {"ground.elements.spacing": [0.2, 0.2], "vehicle.contact_spacing": 0.1, "simulation.duration": 1.8}
+    base = replace(studies.load("soil_side_overturn"), plan=Random(count=3, seed=1))
+    study = replace(base, scenario=base.scenario.replaced(coarse))
+    stated = replace(study, scenario=study.scenario.replaced({"simulation.integrator": "exudyn"}))
+    loop, engine = (conduct(s, tmp_path / name, Way(workers=0)) for s, name in ((study, "loop"), (stated, "engine")))
+    builder = Builder(study)
+    for k, exudyn in enumerate(engine.rows):
+        starts = neighbours(builder.scenario(loop.points.row(k)), STARTS)
+        runs = [_simulated(start, clearance=False)[0] for start in starts]
+        assert runs[0] == loop.rows[k].measures
+        for output in study.outputs:
+            drawn = [run[output.name] for run in runs]
+            allowed = WITHIN * statistics.stdev(drawn) + 1e-6 * abs(statistics.fmean(drawn))
+            assert abs(exudyn.measures[output.name] - statistics.fmean(drawn)) <= allowed, (k, output.name)
+
+
 def by_loop(done: Conducted) -> Conducted:
     rows = [replace(row, provenance={**row.provenance, "integrator": "compiled"}) for row in done.rows]
     return replace(done, rows=rows)
@@ -172,6 +194,7 @@ def test_neighbours_of_a_run_are_many_and_the_run_is_not(monkeypatch: pytest.Mon
     peaks = with_scatter(peak_loads(simulate.run(scenario)), scenario, 3, workers=0)
     assert made == ["exudyn", "compiled", "compiled"]
     assert all(p.scatter is not None and p.scatter < 1e-5 for p in peaks)
+    assert {p.starts_by for p in peaks} == {"compiled"}
     assert [s.integrator for s in regression.starts_of(scenario, 3)] == ["exudyn", "compiled", "compiled"]
 
 
