@@ -126,7 +126,6 @@ class Answer:
     verdict: Literal["same", "changed", "failed", "missing", "unknown", "excluded", "updated"]
     sentence: str
     starts: int = 0
-    integrators: str = ""  # that made the starts: of the first, and of the others where it is another
     wall_time: float = 0.0
     differences: tuple[Difference, ...] = ()
     notes: tuple[str, ...] = ()

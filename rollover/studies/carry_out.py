@@ -72,10 +72,7 @@ class Prepared:
             account = {**_head(self, "done"), **answers(chosen, done), "ran": done.ran}
             account["kept"] = len(set(done.keys)) - done.ran
             account["integrator"] = _integrators(chosen, done)
-            with watch("cases by Exudyn") as show:
-                account["reference_check"] = reference.checked(
-                    chosen, target, way, done, lambda p: show(p.done, p.of, _note(p))
-                )
+            account["reference_check"] = _reference(chosen, target, way, watch, done)
             account["reliability"] = _reliability(chosen, builder, target, way, watch, say)
             account["worst"] = _write_worst(target, chosen, builder, account)
             account["run_time"] = ran
@@ -156,6 +153,14 @@ def _head(ready: Prepared, status: str) -> dict[str, Any]:
         "plan": chosen.plan.kind,
         "versions": versions(),
     }
+
+
+def _reference(chosen: Study, target: Path, way: Way, watch: Watch, done: Conducted) -> dict[str, Any] | None:
+    """Some cases once more by Exudyn, through the same store."""
+    if not reference.chosen(chosen, done):
+        return None
+    with watch("cases by Exudyn") as show:
+        return reference.checked(chosen, target, way, done, lambda p: show(p.done, p.of, _note(p)))
 
 
 def _integrators(chosen: Study, done: Conducted) -> str:

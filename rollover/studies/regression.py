@@ -125,7 +125,7 @@ def compared(
             faults += e.faults
             continue
         known[file] = (found, scenario)
-        starts += [Start(file=file, scenario=s, half_step=False) for s in starts_of(scenario, found.starts)]
+        starts += [Start(file=file, scenario=s, half_step=False) for s in neighbours(scenario, found.starts)]
     if faults:
         raise InputError(*faults)
     outcomes = _worked_off(starts, workers, time_limit, show)
@@ -174,7 +174,7 @@ def updated(
             answers.append(answer)
             continue
         known[file] = scenario = load(file)
-        for again in starts_of(scenario, baselines.STARTS):
+        for again in neighbours(scenario, baselines.STARTS):
             half = again.replaced({"simulation.step": 0.5 * scenario.simulation.step})
             starts += [
                 Start(file=file, scenario=again, half_step=False),
@@ -242,20 +242,12 @@ def _without_runs(file: Path) -> tuple[Answer | None, Path]:
     return Answer(scenario=file.stem, verdict="missing", sentence="no baseline", notes=(advice,)), path
 
 
-def starts_of(scenario: Scenario, count: int) -> list[Scenario]:
-    """The scenario as a single run has it, and its neighbours as those of many runs."""
-    own, *others = neighbours(scenario, count)
-    return [own, *(other.of_many() for other in others)]
-
-
 def _work(start: Start) -> Observed:
     return observed(start.scenario)
 
 
 def _with_ledger(answer: Answer, outcomes: Sequence[Outcome[Start, Observed]]) -> Answer:
-    """The answer with who made the runs, and the largest residual of their ledgers; a note where it is too large."""
-    made = dict.fromkeys(o.case.scenario.integrator for o in outcomes)
-    answer = replace(answer, integrators=", ".join(made))
+    """The answer with the largest residual of the energy ledger in any run, and a note where it is too large."""
     found = [o.value.ledger for o in outcomes if o.value is not None and math.isfinite(o.value.ledger.largest)]
     if not found:
         return answer

@@ -31,6 +31,8 @@ COLUMNS_OF_FLAGS = ("flag", "cases", "share", "share at the peak load")
 def page(study: Study, done: Conducted, account: Mapping[str, Any], *, command: str) -> str:
     """HTML of a study's account."""
     blocks: list[Block] = differences_section(study.scenario)
+    if given := account.get("set"):
+        blocks.append(Note(text=f"Set for this study: {', '.join(given)}."))
     for output in account["outputs"][:MOST_FIGURES]:
         blocks.append(_output(study, done, account, output))
     if rest := account["outputs"][MOST_FIGURES:]:
