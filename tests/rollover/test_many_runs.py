@@ -110,13 +110,13 @@ def test_an_axis_may_lead_from_one_to_the_other(tmp_path: Path) -> None:
 def test_workers_change_no_bit_of_the_answer(tmp_path: Path) -> None:
     study = studies.load(drops(tmp_path, FULL, FEW))
     tables, checks = [], []
-    for workers in (0, 1, 2):
+    for workers in (0, 2):
         folder, way = tmp_path / str(workers), Way(workers=workers)
         done = conduct(study, folder, way)
         tables.append((folder / case_store.TABLE).read_bytes())
         checks.append(reference.checked(study, folder, way, done))
-    assert tables[0] == tables[1] == tables[2]
-    assert checks[0] == checks[1] == checks[2]
+    assert tables[0] == tables[1]
+    assert checks[0] == checks[1]
 
 
 def test_overturns_of_a_study_are_exudyn_s_within_their_scatter(tmp_path: Path) -> None:
@@ -229,8 +229,8 @@ def test_set_gives_the_study_s_scenario_another_value_and_tells(tmp_path: Path) 
         ("ground.law.stifness_scale=2", "--set: ground.law.stifness_scale: "),
         ("gravity=-1", "--set: gravity: "),
         ("simulation.integrator=fast", "--set: simulation.integrator: "),
-        # a value of the axis that the other value rules out
-        ("initiation.kind=release", "--set: axes.0"),
+        # the scenario alone would do
+        ("vehicle=vehicles/utility_tractor.yaml", "--set: simulator: 'drop' drops a striker, got another vehicle"),
     ],
 )
 def test_set_of_what_cannot_be_is_refused(tmp_path: Path, given: str, message: str) -> None:
