@@ -47,7 +47,7 @@ T_B, T_A, T_K, T_C, T_YIELD, T_HARD, T_PLAY, T_RATE, T_Q, T_FAR, MOUNT_COLUMNS =
 # columns of mount_memory, each for the six axes: permanent set, plastic way, deflection and force at the start of the
 # step; the same now
 S_SET, S_FLOWED, S_DELTA, S_FORCE, S_SET_NOW, S_FLOWED_NOW, S_DELTA_NOW, S_FORCE_NOW = 0, 6, 12, 18, 24, 30, 36, 42
-BLOCK = 32  # points that one box stands for, which it costs two of
+BLOCK = 32  # points that one box stands for; looking at it costs as much as looking at two of them
 SET_COLUMNS = 48
 
 # columns of axle_f and axle_memory

@@ -105,10 +105,11 @@ def _made(account: dict[str, Any]) -> list[str]:
 
     n = account["cases"]
     lines = [account["title"], *([account["differs"]] if account.get("differs") else [])]
-    lines += [f"Set: {', '.join(account['set'])}"] if account["set"] else []
-    ran = f"{account['ran']} run now" + (f" by {account['integrator']}" if account["integrator"] != "drop" else "")
+    lines += [f"Set: {', '.join(account['set'])}"] if account.get("set") else []
+    made_by = account.get("integrator", "drop")
+    ran = f"{account['ran']} run now" + ("" if made_by == "drop" else f" by {made_by}")
     lines.append(f"{n['done']} of {n['all']} cases done, {n['failed']} failed; {ran}")
-    said = reference.sentence(account["reference_check"])
+    said = reference.sentence(account.get("reference_check"))
     return [*lines, said] if said else lines
 
 
