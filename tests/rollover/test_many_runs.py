@@ -79,7 +79,7 @@ def test_a_study_is_compiled_and_exudyn_looks_at_a_hundredth(tmp_path: Path) -> 
     assert len(case_store.on_shelf(tmp_path / "out")) == 5
 
 
-def test_a_scenario_that_states_exudyn_has_it_and_the_same_answer(tmp_path: Path) -> None:
+def test_who_states_exudyn_has_it_and_the_same_answer(tmp_path: Path) -> None:
     (tmp_path / "loop").mkdir()
     (tmp_path / "engine").mkdir()
     carried_out(tmp_path / "loop", FULL, FEW)
