@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -82,11 +82,11 @@ class Simulation:
     output_step: Annotated[float, Quantity("s", "between rows of the channels; a multiple of step", above=0)] = 0.001
     spectral_radius: Annotated[float, Quantity("1", "of generalized-alpha at infinity", least=0, most=1)] = 0.7
     integrator: Annotated[
-        Literal["exudyn", "compiled"],
+        Literal["auto", "exudyn", "compiled"],
         "who makes the steps: Exudyn, or the same scheme with the same contact forces in one compiled loop, which "
-        "takes no test stand and no excitation",
+        "takes no test stand and no excitation; auto: Exudyn for a single run, the loop for one of many where it can",
         Later(),
-    ] = "exudyn"
+    ] = "auto"
     stop_at_rest: Annotated[bool, "end early once everything has come to rest"] = False
 
     def validate(self) -> None:
@@ -164,8 +164,25 @@ class Scenario:
             )
         _check_start(self.vehicle, self.initiation)
         check_inputs(self.inputs, self.vehicle, self.initiation)
-        if self.simulation.integrator == "compiled":
-            _check_loop(self.initiation, self.excitation)
+        if self.simulation.integrator == "compiled" and (fault := _beyond_loop(self.initiation, self.excitation)):
+            raise ValueError(f"simulation.integrator: 'compiled' {fault}; 'exudyn' is allowed")
+
+    @property
+    def integrator(self) -> Literal["exudyn", "compiled"]:
+        """Who makes the steps of this scenario, run as it is."""
+        return "exudyn" if self.simulation.integrator == "auto" else self.simulation.integrator
+
+    def of_many(self) -> Scenario:
+        """Return this scenario as one of many runs: with the quicker integrator that can run it, unless it states one.
+
+        Every study, ensemble, fit and diagnosis asks here, so that all of them keep to one rule.
+        """
+        if self.simulation.integrator != "auto":
+            return self
+        chosen: Literal["exudyn", "compiled"] = (
+            "exudyn" if _beyond_loop(self.initiation, self.excitation) else "compiled"
+        )
+        return replace(self, simulation=replace(self.simulation, integrator=chosen))
 
     @property
     def own_code(self) -> dict[str, dict[str, dict[str, str]]]:
@@ -224,18 +241,11 @@ class Scenario:
         return changed
 
 
-def _check_loop(start: Initiation, excitation: Excitation | None) -> None:
-    """Refuse what the compiled loop does not do: a stand and an exciter look in after each step, in Python."""
+def _beyond_loop(start: Initiation, excitation: Excitation | None) -> str:
+    """What the compiled loop does not do, or nothing: a stand and an exciter look in after each step, in Python."""
     if isinstance(start, (StaticTest, PendulumBlow, TiltTable)):
-        raise ValueError(
-            f"simulation.integrator: 'compiled' runs no test stand, got initiation.kind {start.kind!r}; "
-            "'exudyn' is allowed"
-        )
-    if excitation is not None:
-        raise ValueError(
-            f"simulation.integrator: 'compiled' drives no striker, got excitation.kind {excitation.kind!r}; "
-            "'exudyn' is allowed"
-        )
+        return f"runs no test stand, got initiation.kind {start.kind!r}"
+    return "" if excitation is None else f"drives no striker, got excitation.kind {excitation.kind!r}"
 
 
 def _check_start_of_striker(start: Initiation) -> None:

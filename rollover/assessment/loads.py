@@ -22,7 +22,8 @@ class PeakLoad:
     `impulse` (N s) is the momentum that collisions at restitution 0 took on this path, which no force history shows;
     `domain_flags` name what lay outside the ground law's calibrated domain within 50 ms of the peak;
     `half_step_change` is the relative change of the filtered peak at half the step, None if not examined; `mean` and
-    `scatter` (standard deviation over the mean) are those of the filtered peak over an ensemble of `starts`, if any.
+    `scatter` (standard deviation over the mean) are those of the filtered peak over an ensemble of `starts`, if any, of
+    which `starts_by` made all but the run itself.
     """
 
     channel: str
@@ -38,6 +39,7 @@ class PeakLoad:
     starts: int | None = None
     mean: float | None = None
     scatter: float | None = None
+    starts_by: str | None = None
 
 
 WINDOW = 0.05  # s, around a peak, whose touches are judged against the calibrated domain

@@ -236,7 +236,7 @@ def account(
             "versions": versions(),
             **run.scenario.own_code,
             "scenario_hash": content_hash(run.scenario),
-            "integrator": run.scenario.simulation.integrator,
+            "integrator": run.scenario.integrator,
             "wall_time": run.wall_time,
             "stop_time": run.stop_time,
             "domain_flags": run.domain_flags,

@@ -128,7 +128,7 @@ def simulator(scenario: Scenario) -> Simulate:
 
 
 def _simulated(scenario: Scenario) -> Recording:
-    return simulate.run(scenario).recording
+    return simulate.run(scenario.of_many()).recording
 
 
 def calibrate(

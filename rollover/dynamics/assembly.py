@@ -30,6 +30,7 @@ from rollover.spec.vehicle import Striker
 __all__ = ["Body", "bodies_of", "grown", "nose_share", "tables_of"]
 
 Array = NDArray[np.float64]
+SLACK = 1e-6  # m by which a box is larger than its points: far beyond rounding, so that none of them is missed
 PIECE = 0.2  # m: of a patch over uneven ground, most of which is nowhere near it
 
 
@@ -87,7 +88,8 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         point_a=np.concatenate([p[2] for p in points] or [np.zeros(0)]),
         point_body=owner,
         member_f=np.array(members_f).reshape(-1, 9),
-        member_i=np.array(members_i, dtype=np.int64).reshape(-1, 4),
+        member_i=np.array(members_i, dtype=np.int64).reshape(-1, 5),
+        block_f=np.concatenate([_blocks(p[0]) for p in points] or [np.zeros((0, 6))]),
         wheel_f=wheel_f,
         wheel_i=wheel_i,
         spin_i=spin_i,
@@ -169,32 +171,40 @@ def _untouched(*shape: int, dtype: type = np.float64) -> NDArray[Any]:
 
 def _point_rows(
     bodies: tuple[Body, ...], uneven: bool
-) -> tuple[list[tuple[Array, Array, Array]], NDArray[np.int64], list[list[float]], list[tuple[int, int, int, int]]]:
+) -> tuple[list[tuple[Array, Array, Array]], NDArray[np.int64], list[list[float]], list[tuple[int, ...]]]:
     """Points of the bodies' patches, whose they are, and the rows of their boxes; of pieces over uneven ground."""
     points: list[tuple[Array, Array, Array]] = []
     owner: list[NDArray[np.int64]] = []
-    number = 0
+    number, blocks = 0, 0
     members_f: list[list[float]] = []
-    members_i: list[tuple[int, int, int, int]] = []
+    members_i: list[tuple[int, ...]] = []
     for b, body in enumerate(bodies):
         for _, whole in body.surfaces:
             pieces = whole.pieces(PIECE) if uneven else ()
             if pieces:  # without points of its own: where it is far from the ground, so are its pieces
                 members_f.append(_box(whole, body.centre))
-                members_i.append((b, number, number, len(members_i) + 1 + len(pieces)))
+                members_i.append((b, number, number, len(members_i) + 1 + len(pieces), blocks))
             for piece in pieces or (whole,):
                 members_f.append(_box(piece, body.centre))
                 first, number = number, number + len(piece.area)
-                members_i.append((b, first, number, len(members_i) + 1))
+                members_i.append((b, first, number, len(members_i) + 1, blocks))
+                blocks += -(-len(piece.area) // c.BLOCK)
                 points.append((piece.position - body.centre, piece.normal, piece.area))
                 owner.append(np.full(len(piece.area), b, dtype=np.int64))
     return points, np.concatenate(owner or [np.zeros(0, dtype=np.int64)]), members_f, members_i
 
 
+def _blocks(place: Array) -> Array:
+    """Rows of `block_f` for a patch's points (n, 3), about the body's centre of mass."""
+    first = np.arange(0, len(place), c.BLOCK)
+    low, high = np.minimum.reduceat(place, first), np.maximum.reduceat(place, first)
+    return np.hstack([0.5 * (low + high), 0.5 * (high - low) + SLACK])
+
+
 def _box(surface: SurfacePoints, centre: Array) -> list[float]:
     """Row of a patch in `member_f`."""
     low, high = (corner - centre for corner in surface.corners)
-    middle, half = 0.5 * (low + high), 0.5 * (high - low) + 1e-6
+    middle, half = 0.5 * (low + high), 0.5 * (high - low) + SLACK
     return [*middle, *half, *(surface.normal[0] if surface.is_flat else (0.0, 0.0, 0.0))]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.compiled import mark_warm
-from rollover.dynamics import compiled, history, model
+from rollover.dynamics import compiled, history
 from rollover.dynamics.bodies import Body
 from rollover.dynamics.history import History, States
 from rollover.dynamics.recorder import SAID_EVERY, DivergedError, Live, Recorder, watch_of
@@ -71,9 +71,11 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     )
     sentence = ""
     try:
-        if settings.integrator == "compiled":
+        if scenario.integrator == "compiled":
             sentence = compiled.solve(recorder, steps)
         else:
+            from rollover.dynamics import model  # with Exudyn, which takes memory and time, and many runs do without
+
             sentence = model.solve(
                 bodies=rig.bodies,
                 live=live,
@@ -92,7 +94,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
         sentence = str(reason)
     if sentence and (why := _runaway(scenario, live.tables)):
         sentence = f"{why} ({sentence})"
-    mark_warm(settings.integrator)
+    mark_warm(scenario.integrator)
     done = _result(scenario, recorder, sentence, clock.perf_counter() - began)
     if start.note and not done.sentence:
         done = replace(done, sentence=start.note)

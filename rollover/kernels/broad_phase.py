@@ -17,7 +17,7 @@ from ground.kernel import (
     rut_depth,
 )
 from ground.relief import element_plane, height_and_gradient, highest
-from rollover.kernels.tables import MEMORYLESS, OMEGA, OUTSIDE, ROT, SLOTS
+from rollover.kernels.tables import BLOCK, MEMORYLESS, OMEGA, OUTSIDE, ROT, SLOTS
 from rollover.kernels.vectors import depth_acceleration, place, to_body, velocity
 
 AHEAD = 2.0  # steps that a point may be away from memoryless ground: the next may be twice as long, and faster
@@ -77,34 +77,46 @@ def on_plane(t: Any) -> Any:
         facing = -(down[0] * m[6] + down[1] * m[7] + down[2] * m[8])
         is_flat = m[6] * m[6] + m[7] * m[7] + m[8] * m[8] > 0.0
         d0, d1, d2 = down
-        for i in range(t.member_i[member, 1], t.member_i[member, 2]):
-            a, b, c = t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2]
-            depth = base - (d0 * a + d1 * b + d2 * c)
-            if depth <= -near:
+        first, end = t.member_i[member, 1], t.member_i[member, 2]
+        for block in range(-(-(end - first) // BLOCK)):
+            at = first + block * BLOCK
+            if is_clear(t.block_f[t.member_i[member, 4] + block], down, base, near):
                 continue
-            if not is_flat:
-                nx, ny, nz = t.point_n[i, 0], t.point_n[i, 1], t.point_n[i, 2]
-                # a listed point has no normal: it stands for its area whichever way the body is turned
-                facing = -(d0 * nx + d1 * ny + d2 * nz) if nx != 0.0 or ny != 0.0 or nz != 0.0 else 1.0
-                if facing <= 1e-6:
+            for i in range(at, min(at + BLOCK, end)):
+                a, b, c = t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2]
+                depth = base - (d0 * a + d1 * b + d2 * c)
+                if depth <= -near:
                     continue
-            x, y, z = place(row, a, b, c)
-            ix = math.floor((x - t.grid_f[0]) / t.grid_f[2])
-            iy = math.floor((y - t.grid_f[1]) / t.grid_f[3])
-            if ix < 0 or iy < 0 or ix >= t.grid_i[0] or iy >= t.grid_i[1]:
-                t.counts[OUTSIDE] += 1
-                continue
-            cell = ix * t.grid_i[1] + iy
-            key = key_of(t, cell, i)
-            if depth <= 0.0 and (key == cell or not arrives(t, row, i, n, depth)):
-                continue
-            slot = slot_at(t, cell, key)
-            # an element at rest keeps its rut: it is touched only beyond it
-            if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]) and key == cell:
-                continue
-            count += note_candidate(t, candidates, count, slot, i, facing, depth)
-            candidates += 1
+                if not is_flat:
+                    nx, ny, nz = t.point_n[i, 0], t.point_n[i, 1], t.point_n[i, 2]
+                    # a listed point has no normal: it stands for its area whichever way the body is turned
+                    facing = -(d0 * nx + d1 * ny + d2 * nz) if nx != 0.0 or ny != 0.0 or nz != 0.0 else 1.0
+                    if facing <= 1e-6:
+                        continue
+                x, y, z = place(row, a, b, c)
+                ix = math.floor((x - t.grid_f[0]) / t.grid_f[2])
+                iy = math.floor((y - t.grid_f[1]) / t.grid_f[3])
+                if ix < 0 or iy < 0 or ix >= t.grid_i[0] or iy >= t.grid_i[1]:
+                    t.counts[OUTSIDE] += 1
+                    continue
+                cell = ix * t.grid_i[1] + iy
+                key = key_of(t, cell, i)
+                if depth <= 0.0 and (key == cell or not arrives(t, row, i, n, depth)):
+                    continue
+                slot = slot_at(t, cell, key)
+                # an element at rest keeps its rut: it is touched only beyond it
+                if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]) and key == cell:
+                    continue
+                count += note_candidate(t, candidates, count, slot, i, facing, depth)
+                candidates += 1
     return candidates, count
+
+
+@inlined
+def is_clear(box: Any, down: Any, base: float, near: float) -> bool:
+    """Whether no point of a box is near the ground: none of them would be looked at further."""
+    reach = abs(down[0]) * box[3] + abs(down[1]) * box[4] + abs(down[2]) * box[5]
+    return base - (down[0] * box[0] + down[1] * box[1] + down[2] * box[2]) + reach <= -near  # type: ignore[no-any-return]
 
 
 @leaf

@@ -47,6 +47,7 @@ T_B, T_A, T_K, T_C, T_YIELD, T_HARD, T_PLAY, T_RATE, T_Q, T_FAR, MOUNT_COLUMNS =
 # columns of mount_memory, each for the six axes: permanent set, plastic way, deflection and force at the start of the
 # step; the same now
 S_SET, S_FLOWED, S_DELTA, S_FORCE, S_SET_NOW, S_FLOWED_NOW, S_DELTA_NOW, S_FORCE_NOW = 0, 6, 12, 18, 24, 30, 36, 42
+BLOCK = 32  # points that one box stands for; looking at it costs as much as looking at two of them
 SET_COLUMNS = 48
 
 # columns of axle_f and axle_memory
@@ -112,7 +113,8 @@ class Tables(NamedTuple):
     point_a: Any  # (np,)
     point_body: Any  # (np,)
     member_f: Any  # (nm, 9) centre and half size of a box around a patch's points, normal of a flat patch or 0
-    member_i: Any  # (nm, 4) body, first point, end, next member if the box is nowhere near the ground
+    member_i: Any  # (nm, 5) body, first point, end, next member if the box is nowhere near the ground, first block
+    block_f: Any  # (nk, 6) centre and half size of a box around `BLOCK` points of a patch that follow each other
     wheel_f: Any  # (nw, WHEEL_COLUMNS)
     wheel_i: Any  # (nw,) carrier
     spin_i: Any  # (nw,) coordinate of the wheel's angle, or -1: it does not turn by itself
@@ -202,6 +204,7 @@ def handle(t: Any) -> Any:
         t.point_body,
         t.member_f,
         t.member_i,
+        t.block_f,
         t.wheel_f,
         t.wheel_i,
         t.spin_i,

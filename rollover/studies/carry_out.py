@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,15 +15,19 @@ from scipy.special import ndtr
 
 from rollover.assessment.results import plain, versions
 from rollover.assessment.shipped import origin
+from rollover.spec import document
 from rollover.spec.document import content_hash, dump
-from rollover.studies import case_store, cluster, reliability
+from rollover.studies import case_store, cluster, reference, reliability
+from rollover.studies.case import made_by
 from rollover.studies.design import from_unit, points
 from rollover.studies.runner import Builder, Conducted, Progress, Way, conduct, evaluate
 from rollover.studies.study import Study, load
 from rollover.studies.summary import answers, values_of
+from rollover.system.errors import Fault, InputError
 from rollover.system.writing import sweep
 
 Page = Callable[[Conducted, Mapping[str, Any]], str]
+SET = "--set"
 Watch = Callable[[str], AbstractContextManager[Callable[..., None]]]
 
 
@@ -42,6 +46,7 @@ class Prepared:
     study: Study
     folder: Path
     target: Path
+    given: tuple[str, ...] = ()  # what was set in the scenario of the study's file, PATH=VALUE
 
     def carried_out(
         self,
@@ -58,14 +63,16 @@ class Prepared:
         """
         chosen, target = self.study, self.target
         with case_store.locked(target):
-            _begin(target, self.name, chosen)
+            _begin(self)
             began = time.perf_counter()
             with watch("cases") as show:
                 done = conduct(chosen, target, way, lambda p: show(p.done, p.of, _note(p)))
             ran = time.perf_counter() - began
             builder = Builder(chosen)
-            account = {**_head(self.name, chosen, "done"), **answers(chosen, done), "ran": done.ran}
+            account = {**_head(self, "done"), **answers(chosen, done), "ran": done.ran}
             account["kept"] = len(set(done.keys)) - done.ran
+            account["integrator"] = _integrators(chosen, done)
+            account["reference_check"] = _reference(chosen, target, way, watch, done)
             account["reliability"] = _reliability(chosen, builder, target, way, watch, say)
             account["worst"] = _write_worst(target, chosen, builder, account)
             account["run_time"] = ran
@@ -75,9 +82,22 @@ class Prepared:
         return account
 
 
-def prepared(path: Path, out: Path | None = None, *, scheduler: str = "", force: bool = False) -> Prepared:
-    """Read a study and what it needs, and claim its folder (None: out/study/NAME). Raises `InputError`."""
+def prepared(
+    path: Path,
+    out: Path | None = None,
+    *,
+    changes: Mapping[str, Any] | None = None,
+    given: Sequence[str] = (),
+    scheduler: str = "",
+    force: bool = False,
+) -> Prepared:
+    """Read a study and what it needs, and claim its folder (None: out/study/NAME). Raises `InputError`.
+
+    `changes` are values of its scenario by path, told as they were `given`; its axes are checked with them.
+    """
     chosen = load(path)
+    if changes:
+        chosen = _changed(chosen, changes)
     points(chosen)  # reads the plan's table as well, before anything is written
     if chosen.reliability is not None:
         reliability.installed()
@@ -85,17 +105,30 @@ def prepared(path: Path, out: Path | None = None, *, scheduler: str = "", force:
         cluster.installed(scheduler)
     folder = out or Path("out", "study", path.stem)
     target = case_store.claim(folder, path.stem, force=force)
-    return Prepared(name=path.stem, study=chosen, folder=folder, target=target)
+    return Prepared(name=path.stem, study=chosen, folder=folder, target=target, given=tuple(given))
 
 
-def _begin(target: Path, name: str, chosen: Study) -> None:
+def _changed(chosen: Study, changes: Mapping[str, Any]) -> Study:
+    """The study of a scenario with other values, its axes checked with them. Raises `InputError`."""
+    for axis in chosen.axes:
+        for at in axis.paths if axis.apply == "value" else ():
+            lost = next((path for path in changes if path == at or path.startswith(f"{at}.")), None)
+            if lost is not None:
+                message = f"set by the axis {axis.name!r} in every case; another path, or another axis in the file"
+                raise InputError(Fault(file=SET, path=lost, message=message))
+    scenario = chosen.scenario.replaced(changes, origin=SET)
+    return document.replaced(chosen, {"scenario": scenario}, SET)
+
+
+def _begin(ready: Prepared) -> None:
     """Mark the folder as this study's, so that it can be gone on with after whatever happens."""
+    target, name, chosen = ready.target, ready.name, ready.study
     target.mkdir(parents=True, exist_ok=True)
     sweep(target)  # what a process left that was killed
     head = f"{chosen.title}\nEvery value of the study beside this file."
     case_store.put_text(target / case_store.STUDY, dump(chosen, head))
     if not (target / case_store.ACCOUNT).exists() or _name_of(target / case_store.ACCOUNT) != name:
-        case_store.put_text(target / case_store.ACCOUNT, json.dumps(_head(name, chosen, "running"), indent=2) + "\n")
+        case_store.put_text(target / case_store.ACCOUNT, json.dumps(_head(ready, "running"), indent=2) + "\n")
 
 
 def _name_of(account: Path) -> str:
@@ -105,20 +138,35 @@ def _name_of(account: Path) -> str:
         return ""
 
 
-def _head(name: str, chosen: Study, status: str) -> dict[str, Any]:
-    made_from = origin(chosen.scenario)
+def _head(ready: Prepared, status: str) -> dict[str, Any]:
+    chosen, made_from = ready.study, origin(ready.study.scenario)
     return {
         "format": case_store.FORMAT,
-        "name": name,
+        "name": ready.name,
         "title": chosen.title,
         "differs": made_from.in_words if made_from else "",
+        "set": list(ready.given),
         "status": status,
         "scenario_hash": content_hash(chosen.scenario),
         **chosen.scenario.own_code,
-        "integrator": chosen.scenario.simulation.integrator,
+        "integrator": made_by(chosen.scenario.of_many(), chosen.simulator),
         "plan": chosen.plan.kind,
         "versions": versions(),
     }
+
+
+def _reference(chosen: Study, target: Path, way: Way, watch: Watch, done: Conducted) -> dict[str, Any] | None:
+    """Some cases once more by Exudyn, through the same store."""
+    if not reference.chosen(chosen, done):
+        return None
+    with watch("cases by Exudyn") as show:
+        return reference.checked(chosen, target, way, done, lambda p: show(p.done, p.of, _note(p)))
+
+
+def _integrators(chosen: Study, done: Conducted) -> str:
+    """Which integrator made the cases, both where an axis leads from one to the other."""
+    told = {str(name) for row in done.rows if (name := row.provenance.get("integrator"))}
+    return ", ".join(sorted(told)) or made_by(chosen.scenario.of_many(), chosen.simulator)
 
 
 def _note(p: Progress) -> str:

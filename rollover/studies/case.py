@@ -85,6 +85,11 @@ def key_of(scenario: Scenario, *, simulator: Simulator, clearance: bool) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:40]
 
 
+def made_by(scenario: Scenario, simulator: Simulator) -> str:
+    """Which integrator makes the run of a scenario; "drop" is that of a drop by itself."""
+    return "drop" if simulator == "drop" else scenario.integrator
+
+
 @functools.cache
 def stated_versions() -> str:
     """Versions of all that a result depends on, in one line; asked once."""
@@ -130,6 +135,7 @@ def work(case: Case) -> Result:
         "peak_memory": _peak_memory(),
         "host": platform.node(),
         "process": os.getpid(),
+        "integrator": made_by(scenario, case.simulator),
     }
     return Result(
         measures=measures, domain_flags=run_flags, peak_flags=peak_flags, sentence=sentence, provenance=provenance

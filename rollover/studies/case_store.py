@@ -34,7 +34,7 @@ ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK = (
     ".lock",
 )
 FILES = (ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK)
-TOLD = ("finished", "wall_time", "cpu_time", "peak_memory", "host", "process")
+TOLD = ("finished", "wall_time", "cpu_time", "peak_memory", "host", "process", "integrator")
 PROVENANCE_UNITS = {"wall_time": "s", "cpu_time": "s", "peak_memory": "B"}
 _TYPES = dict.fromkeys(("wall_time", "cpu_time", "peak_memory", "process"), (int, float))  # of what is told; else text
 

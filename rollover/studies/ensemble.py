@@ -149,7 +149,8 @@ def with_scatter(
     Raises `FailedRunError` if one of them fails.
     """
     ensemble = [{(p.channel, f"CFC {p.cfc}"): p.filtered for p in peaks}]
-    for outcome in map_cases(measured, neighbours(scenario, starts)[1:], workers=workers):
+    others = [s.of_many() for s in neighbours(scenario, starts)[1:]]
+    for outcome in map_cases(measured, others, workers=workers):
         if outcome.value is None:
             assert outcome.failure is not None
             raise FailedRunError(f"neighbouring start {outcome.index + 2} of {starts}: {outcome.failure.sentence}")
@@ -159,5 +160,5 @@ def with_scatter(
         values = [start[peak.channel, f"CFC {peak.cfc}"] for start in ensemble]
         mean = statistics.fmean(values)
         scatter = statistics.stdev(values) / mean if mean > 0.0 else 0.0
-        found.append(replace(peak, starts=starts, mean=mean, scatter=scatter))
+        found.append(replace(peak, starts=starts, mean=mean, scatter=scatter, starts_by=others[0].integrator))
     return tuple(found)

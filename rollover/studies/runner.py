@@ -21,6 +21,7 @@ from rollover.studies.case import (
     Result,
     case_of,
     key_of,
+    made_by,
     own_files,
     stated_versions,
     warm_up,
@@ -34,6 +35,7 @@ from rollover.system.processes import Failure, Outcome, map_cases
 
 TIME_LIMIT = 600.0  # s of wall time, for one case
 MEMORY_LIMIT = 4e9  # bytes that one case may take
+INTEGRATOR = "simulation.integrator"
 Show = Callable[["Progress"], None]
 
 
@@ -65,6 +67,7 @@ class Builder:
     """Scenarios of points. Values are exchanged in the base where that gives the same as reading them would."""
 
     study: Study
+    integrator: str = ""  # that makes the cases; empty: as the study has it
     fast: bool | None = None
     clearance: bool = field(init=False)
     base: dict[str, dict[str, Any]] = field(init=False)
@@ -74,7 +77,13 @@ class Builder:
         self.clearance = any(output.name in CLEARANCE for output in self.study.outputs)
 
     def scenario(self, values: Mapping[str, Any]) -> Scenario:
-        """The scenario of one point. Raises ``ValueError`` for values that it does not allow."""
+        """The scenario of one point, its integrator chosen. Raises ``ValueError`` for values that it does not allow."""
+        found = self._changed(values)
+        if self.study.simulator == "drop":
+            return found
+        return found.replaced({INTEGRATOR: self.integrator}) if self.integrator else found.of_many()
+
+    def _changed(self, values: Mapping[str, Any]) -> Scenario:
         base = self.study.scenario
         found: dict[str, Any] = {}
         for axis in self.study.axes:
@@ -182,7 +191,7 @@ def _outcomes(cases: Iterator[Case], way: Way, study: Study) -> Iterator[Outcome
     limits: dict[str, Any] = {
         "time_limit": way.time_limit,
         "memory_limit": way.memory_limit,
-        "warm_up": partial(warm_up, study.simulator, study.scenario.simulation.integrator),
+        "warm_up": partial(warm_up, study.simulator, study.scenario.of_many().integrator),
     }
     if way.scheduler:
         from rollover.studies.cluster import map_on_cluster
@@ -223,6 +232,7 @@ def _plan_hash(study: Study, found: Points) -> str:
         axes,
         study.simulator,
         Builder(study).clearance,
+        made_by(study.scenario.of_many(), study.simulator),
         stated_versions(),
         own_files("effects"),
         *filter(None, [own_files("laws")]),

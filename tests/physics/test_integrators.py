@@ -17,7 +17,7 @@ from rollover.assessment.ledger import closure
 from rollover.dynamics import simulate
 from rollover.dynamics.assembly import grown, tables_of
 from rollover.dynamics.result import Run
-from rollover.kernels.tables import Tables
+from rollover.kernels.tables import BLOCK, Tables
 from rollover.scenario import Scenario, load
 from rollover.spec.document import content_hash, shipped_folder, to_mapping
 from rollover.studies.case_store import Row
@@ -167,6 +167,33 @@ def test_memory_that_grows_in_a_run_changes_nothing(integrator: str, monkeypatch
     assert all(np.array_equal(wide.recording[c], own.recording[c]) for c in wide.recording.channels)
 
 
+def test_boxes_leave_out_only_points_that_touch_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = short("side_overturn", **{"simulation.duration": 1.3, "simulation.integrator": "compiled"})
+    boxed = simulate.run(scenario)
+    made: list[Tables] = []
+
+    def boundless(*given: Any) -> Tables:
+        t = tables_of(*given)
+        made.append(t._replace(block_f=t.block_f.copy()))
+        t.block_f[:, 3:] = 1e3  # no box is ever clear of the ground
+        return t
+
+    monkeypatch.setattr("rollover.dynamics.setup.tables_of", boundless)
+    every = simulate.run(scenario)
+    assert "first-touch" in [e.kind for e in boxed.events]
+    assert all(np.array_equal(boxed.recording[c], every.recording[c]) for c in boxed.recording.channels)
+    (t,) = made
+    boxes = 0
+    for _, first, end, _, box in t.member_i.tolist():
+        for at in range(first, end, BLOCK):
+            low, high = t.block_f[box, :3] - t.block_f[box, 3:], t.block_f[box, :3] + t.block_f[box, 3:]
+            points = t.point_r[at : min(at + BLOCK, end)]
+            assert (low < points).all()
+            assert (points < high).all()
+            box, boxes = box + 1, boxes + 1
+    assert boxes == len(t.block_f)
+
+
 def test_runs_in_threads_are_those_one_after_another() -> None:
     own = [short("drop_test", **{"initiation.speed": v, "simulation.integrator": "compiled"}) for v in (1.0, 2.0, 3.0)]
     own += [short("cube_toss", **{"simulation.integrator": "compiled"})]
@@ -195,11 +222,11 @@ def test_a_file_that_asks_for_it_on_a_stand_is_told_the_line(tmp_path: Path) -> 
 def test_the_key_at_its_default_changes_no_hash() -> None:
     scenario = load("drop_test")
     mapping = to_mapping(scenario)
-    assert (mapping["simulation"].pop("integrator"), mapping.pop("inputs")) == ("exudyn", [])
+    assert (mapping["simulation"].pop("integrator"), mapping.pop("inputs")) == ("auto", [])
     assert to_mapping(scenario, hashed=True) == mapping
     compiled = scenario.replaced({"simulation.integrator": "compiled"})
     assert content_hash(compiled) != content_hash(scenario)
-    assert content_hash(compiled.replaced({"simulation.integrator": "exudyn"})) == content_hash(scenario)
+    assert content_hash(compiled.replaced({"simulation.integrator": "auto"})) == content_hash(scenario)
 
 
 def test_results_say_which_integrator_made_them() -> None:

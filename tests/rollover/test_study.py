@@ -202,7 +202,7 @@ def test_a_case_is_the_run_of_its_scenario() -> None:
     builder = Builder(text)
     values = {"speed": 2.0, "soil": 1.3}
     scenario = builder.scenario(values)
-    slow = text.scenario.replaced({"initiation.speed": 2.0, "ground.law.stiffness_scale": 1.3})
+    slow = text.scenario.replaced({"initiation.speed": 2.0, "ground.law.stiffness_scale": 1.3}).of_many()
     assert document.content_hash(scenario) == document.content_hash(slow)
     result = work(builder.case(builder.key(values), values))
     run = simulate.run(slow)

@@ -297,7 +297,7 @@ def _course(run: Run, answer: Mapping[str, Any]) -> list[Block]:
             ("Vehicle", scenario.vehicle.name),
             ("Begins with", scenario.initiation.kind),
             ("Ground law", scenario.ground.law.__class__.kind),  # type: ignore[attr-defined]
-            ("Step", f"{1e3 * scenario.simulation.step:g} ms, integrator {scenario.simulation.integrator}"),
+            ("Step", f"{1e3 * scenario.simulation.step:g} ms, integrator {scenario.integrator}"),
             ("Simulated", f"{run.stop_time:g} s in {run.wall_time:.2g} s"),
             ("Phases", ", ".join(f"{name} from {start:.3f} s" for start, name in run.phases)),
             ("Effects switched on", ", ".join(scenario.effects) or "none"),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.assessment.ledger import of_cases
-from rollover.studies import failures
+from rollover.studies import failures, reference
 from rollover.studies.runner import Conducted
 from rollover.studies.study import Study
 from rollover.studies.summary import values_of
@@ -31,6 +31,8 @@ COLUMNS_OF_FLAGS = ("flag", "cases", "share", "share at the peak load")
 def page(study: Study, done: Conducted, account: Mapping[str, Any], *, command: str) -> str:
     """HTML of a study's account."""
     blocks: list[Block] = differences_section(study.scenario)
+    if given := account.get("set"):
+        blocks.append(Note(text=f"Set for this study: {', '.join(given)}."))
     for output in account["outputs"][:MOST_FIGURES]:
         blocks.append(_output(study, done, account, output))
     if rest := account["outputs"][MOST_FIGURES:]:
@@ -41,6 +43,8 @@ def page(study: Study, done: Conducted, account: Mapping[str, Any], *, command: 
         blocks.append(_worst(account["worst"]))
     if said := failures.sentence(account["failures_along"]):
         blocks.insert(0, Note(text=f"{said}.", warning=True))
+    if said := reference.sentence(account.get("reference_check")):
+        blocks.append(Note(text=f"Integrator: {account['integrator']}. {said}."))
     if count := account["from_rest"]:
         blocks.append(Note(text=f"{count} cases had no static balance on their surface and began from rest."))
     if (ledger := account.get("ledger")) and ledger["open"]:

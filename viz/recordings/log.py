@@ -128,7 +128,7 @@ def _documents(out: Stream, run: Run, words: str) -> None:
         "status": run.status,
         "sentence": run.sentence,
         "scenario_hash": content_hash(run.scenario),
-        "integrator": run.scenario.simulation.integrator,
+        "integrator": run.scenario.integrator,
         "domain_flags": ", ".join(run.domain_flags),
         "stop_time_s": run.stop_time,
         "wall_time_s": run.wall_time,

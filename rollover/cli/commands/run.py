@@ -79,7 +79,7 @@ def run(
         chosen = chosen.replaced(settings(set_), origin="--set")
     for line in chosen.idle:
         console.say(f"{path}: {line}")
-    compiles = not is_warm(chosen.simulation.integrator)
+    compiles = not is_warm(chosen.integrator)
     if compiles:
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     from rollover.assessment import results

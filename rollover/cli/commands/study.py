@@ -11,7 +11,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.cli.commands.common import COMPILING, FAILED, AsJson, Force, answering, app, manual
+from rollover.cli.commands.common import (
+    COMPILING,
+    FAILED,
+    AsJson,
+    Force,
+    Setting,
+    answering,
+    app,
+    manual,
+    settings,
+)
 from rollover.system.arguments import LONGEST, MOST_MEMORY
 
 if TYPE_CHECKING:
@@ -27,6 +37,7 @@ class Retry(StrEnum):
 @app.command(
     epilog=manual(
         "study my_study.yaml --workers 4",
+        "study soil_side_overturn --set initiation.excess_deg=6 --out out/pushed",
         writes="study.json, cases and their table with a row for each, failed ones too, report.html, the worst case as "
         "a scenario. Run again, it resumes.",
     )
@@ -34,6 +45,7 @@ class Retry(StrEnum):
 @answering
 def study(
     name: Annotated[str, typer.Argument(help="A study file, or the name of a shipped one.", metavar="STUDY")],
+    set_: Setting = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/study/NAME")] = None,
     workers: Annotated[
         int | None, typer.Option(help="Cases at once; 0 for this process", show_default="number of cores", min=0)
@@ -58,7 +70,7 @@ def study(
     from rollover.studies.runner import Way
 
     path = studies.find(name)
-    ready = prepared(path, out, scheduler=scheduler, force=force)
+    ready = prepared(path, out, changes=settings(set_ or []), given=set_ or [], scheduler=scheduler, force=force)
     chosen = ready.study
     way = Way(
         workers=workers,
@@ -67,9 +79,10 @@ def study(
         memory_limit=1e6 * memory_limit,
         retry="failed" if retry else "",
     )
-    if not is_warm(chosen.scenario.simulation.integrator) and chosen.simulator == "full":
+    if not is_warm(chosen.scenario.of_many().integrator) and chosen.simulator == "full":
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
-    command = " ".join(map(shlex.quote, ["rollover", "study", name, *(["--out", str(out)] if out else [])]))
+    words = ["rollover", "study", name, *(w for s in set_ or [] for w in ("--set", s))]
+    command = " ".join(map(shlex.quote, [*words, *(["--out", str(out)] if out else [])]))
 
     def drawn(done: Conducted, account: Mapping[str, Any]) -> str:
         from viz.pages.study import page
@@ -86,6 +99,20 @@ def study(
         raise typer.Exit(FAILED)
 
 
+def _made(account: dict[str, Any]) -> list[str]:
+    """What was run, of what, by which integrator, and how far Exudyn's cases lie from it."""
+    from rollover.studies import reference
+
+    n = account["cases"]
+    lines = [account["title"], *([account["differs"]] if account.get("differs") else [])]
+    lines += [f"Set: {', '.join(account['set'])}"] if account.get("set") else []
+    made_by = account.get("integrator", "drop")
+    ran = f"{account['ran']} run now" + ("" if made_by == "drop" else f" by {made_by}")
+    lines.append(f"{n['done']} of {n['all']} cases done, {n['failed']} failed; {ran}")
+    said = reference.sentence(account.get("reference_check"))
+    return [*lines, said] if said else lines
+
+
 def sentences(account: dict[str, Any]) -> list[str]:
     """The account in a few lines."""
     from rollover.assessment.ledger import of_cases
@@ -93,9 +120,7 @@ def sentences(account: dict[str, Any]) -> list[str]:
     from rollover.studies import failures
     from viz.pages.report import series_unit
 
-    n = account["cases"]
-    lines = [account["title"], *([account["differs"]] if account.get("differs") else [])]
-    lines += [f"{n['done']} of {n['all']} cases done, {n['failed']} failed; {account['ran']} run now"]
+    lines = _made(account)
     for each in account["outputs"]:
         unit = series_unit(each["unit"])[0]
         lines.append(f"{each['name']}, {unit}")
