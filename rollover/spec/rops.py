@@ -7,12 +7,16 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.kinds import ByKind
 from ground.quantity import Quantity, parameters
+from rollover.spec.beam import Beam
 from rollover.spec.connector import Connector
 from rollover.spec.inertia import MassProperties
 from rollover.spec.mechanism import Joint, free_motions, sentence
 from rollover.spec.provenance import Provenance
-from rollover.spec.shapes import Point, Shape
+from rollover.spec.shapes import Box, Disc, Point, Points, Shape, Tube
+
+Member = Annotated[Box | Tube | Disc | Points | Beam, ByKind(usual="beam")]
 
 
 @parameters
@@ -50,7 +54,7 @@ class Upper:
 
     body: MassProperties
     hinges: Annotated[tuple[Connector, ...], "between the lower and the upper part"]
-    members: Annotated[tuple[Shape, ...], "tubes and boxes of the upper part that can touch the ground"]
+    members: Annotated[tuple[Member, ...], "tubes, beams and boxes of the upper part that can touch the ground"]
 
 
 @parameters
@@ -60,7 +64,7 @@ class Rops:
     frame: Literal["two-post-rear", "two-post-front", "four-post", "cab"]
     body: Annotated[MassProperties, "of the frame; without its upper part if there is one"]
     mounts: Annotated[tuple[Connector, ...], "between the chassis and the frame"]
-    members: Annotated[tuple[Shape, ...], "tubes and boxes that can touch the ground"]
+    members: Annotated[tuple[Member, ...], "tubes, beams with a section and boxes that can touch the ground"]
     upper: Upper | None = None
     corner: Annotated[Point, Quantity("m", "upper corner whose deflection is reported; the left one, y > 0")]
     other_corners: Annotated[
@@ -103,7 +107,18 @@ class Rops:
     @property
     def parts(self) -> dict[str, tuple[MassProperties, tuple[Shape, ...]]]:
         """Bodies of the frame by name, from below: mass properties and members."""
-        found = {"rops": (self.body, self.members)}
+        found = {"rops": (self.body, shapes(self.members))}
         if self.upper is not None:
-            found["rops_upper"] = (self.upper.body, self.upper.members)
+            found["rops_upper"] = (self.upper.body, shapes(self.upper.members))
         return found
+
+    @property
+    def beams(self) -> tuple[Beam, ...]:
+        """Members that have a section, of both parts."""
+        upper = () if self.upper is None else self.upper.members
+        return tuple(m for m in (*self.members, *upper) if isinstance(m, Beam))
+
+
+def shapes(members: tuple[Member, ...]) -> tuple[Shape, ...]:
+    """What of members can touch the ground."""
+    return tuple(m.tube if isinstance(m, Beam) else m for m in members)
