@@ -72,7 +72,7 @@ def test_a_frame_is_tested_by_its_vehicles_mass(tmp_path) -> None:
         assert e["energy"] == pytest.approx(
             sum(0.5 * (b - a) * (u + v) for a, b, u, v in zip(x, x[1:], y, y[1:], strict=False))
         )
-        assert 0.0 <= e["permanent_set"] < e["deflection"]
+        assert -1e-9 <= e["permanent_set"] < e["deflection"]
     # both feet hinge under the rear load, the nearer post first; a two-post frame is two cantilevers lengthways
     assert [h["member"] for h in loads["rear"]["hinges"]] == ["post_left", "post_right"]
     assert {h["member"] for h in loads["side"]["hinges"]} == {"post_left", "post_right", "crossbar"}
@@ -110,7 +110,8 @@ def test_a_vehicle_and_a_scenario_bring_their_own_loads(tmp_path) -> None:
 
 
 def test_a_load_pushed_on_shows_the_margin(tmp_path) -> None:
-    scenario = scenario_of(written(tmp_path, "[60, 60, 4]"), 1000.0).replaced({"initiation.push_on": "rear"})
+    near = written(tmp_path, "[60, 60, 4]", **{"[0.30, 0.0, 1.15]": "[0.30, 0.0, 1.55]"})
+    scenario = scenario_of(near, 1000.0).replaced({"initiation.push_on": "rear"})
     found = frame_test(scenario)
     last = found.tests[-1]
     assert last["name"] == "rear"
