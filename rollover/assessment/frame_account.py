@@ -95,7 +95,7 @@ def account(found: FrameTest, about: Mapping[str, Any] | None = None) -> dict[st
         "vehicle": vehicle.name,
         "mass": vehicle.whole.mass,
         "frame_mass": sum(b.body.mass for b in found.rops.beams),
-        "base": "clamped" if found.clamped else "mounts",
+        "base": "clamped" if found.clamped or not found.rops.mounts else "mounts",
         "segments": found.segments,
         "elements": len(found.frame.mesh.ends),
         "versions": versions(),

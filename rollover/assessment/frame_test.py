@@ -24,6 +24,7 @@ from rollover.dynamics.stands.static_load import (
     fall,
 )
 from rollover.scenario import Scenario
+from rollover.spec.feet import REACH
 from rollover.spec.rops import Rops
 from rollover.spec.stand import DIRECTION, StaticTest
 from rollover.spec.standards.codes import STANDARDS, STATIC
@@ -33,7 +34,6 @@ from rollover.system.errors import Fault, InputError
 
 SEGMENTS = 12  # to a member: forces and energies within 0.5 % of four times as many (tested)
 STEP = 0.004  # m of deflection; a standard asks for points 0.015 m apart at most
-REACH = 0.15  # m from a mount to the member that it holds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,12 +124,14 @@ def _refuse(rops: Rops) -> None:
 def _frame(rops: Rops, loads: Sequence[Push], segments: int, clamped: bool) -> Frame:
     beams = rops.beams
     points = {f"vehicle.rops.mounts.{m.name}": m.position for m in rops.mounts}
+    points |= {f"vehicle.rops.feet.{f.name}": f.position for f in rops.feet}
     mesh(beams, points, 2, REACH)  # a mount away from every member is refused
     whole = mesh(beams, points | {load.name: load.point for load in loads}, segments)
     supports = [
         Support(name=m.name, node=whole.at[f"vehicle.rops.mounts.{m.name}"], connector=None if clamped else m)
         for m in rops.mounts
     ]
+    supports += [Support(name=f.name, node=whole.at[f"vehicle.rops.feet.{f.name}"]) for f in rops.feet]
     return Frame(whole, supports)
 
 

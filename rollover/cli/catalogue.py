@@ -153,7 +153,7 @@ def check(name: str) -> str:
     for what, annotation, meant in (
         ("soil", scenarios.AnyLaw, kind in known_laws()),
         ("vehicle", scenarios.AnyVehicle, kind in document.slot_of(scenarios.AnyVehicle).kinds),
-        ("rops", Rops, "mounts" in keys),
+        ("rops", Rops, bool({"mounts", "feet"} & set(keys))),
         ("steel", Steel, "yield_strength" in keys),
     ):
         if meant:
