@@ -141,6 +141,16 @@ def test_thin_walls_are_told(tmp_path) -> None:
     assert json.loads(stocky.stdout)["warnings"] == []
 
 
+def test_a_crushing_beam_lies_on_the_posts(tmp_path) -> None:
+    """60 kN in the middle of the beam would be P L/8 = 7.5 kN m, beyond its 6.3 kN m; on the posts nothing yields."""
+    scenario = scenario_of(written(tmp_path, "[60, 60, 4]"), 3000.0)
+    (crush,) = frame_test(scenario.replaced({"initiation.loads": [{"name": "crush", "asks": "crush"}]})).tests
+    assert (crush["status"], crush["hinges"], crush["first_yield"]) == ("reached", [], None)
+    assert crush["force"] == pytest.approx(60e3, rel=1e-5)
+    # two posts as columns on their mounts: F/(2 (1/k + H/(E A))^-1), the beam's ends turn a little with them
+    assert crush["deflection"] == pytest.approx(30e3 * (1.0 / 5e7 + 1.61 / (210e9 * 8.548e-4)), rel=0.02)
+
+
 def test_soft_mounts_give_and_clamped_feet_do_not(tmp_path) -> None:
     soft = written(tmp_path, **{"[1.0e6, 1.0e6, 1.0e6]": "[1.0e5, 1.0e5, 1.0e5]"})
     found = {

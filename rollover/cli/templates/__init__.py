@@ -50,9 +50,9 @@ def _rops(name: str) -> Mapping[str, str]:
         f"{name}: a two-post ROPS at the rear of a tractor of 3000 kg, to be replaced by your own tubes.\n"
         f"Check: rollover check {name}.yaml   What it carries: rollover rops {name}.yaml --mass 3000\n"
         f"Use: rops: {name}.yaml in a vehicle, or rollover run side_overturn --set vehicle.rops={name}.yaml\n"
-        "A key with a default may be left out. Other sections and members: `rollover schema rops`; steels: `rollover list\n"
-        "steels`, or {base: S355, yield_strength: ...}. Of a frame whose side-load curve was measured, `mounts` with that\n"
-        "stiffness and yield stand in the place of `feet`, as in vehicles/rops/two_post_rear_3t.yaml."
+        "A key with a default may be left out. Other sections and members: `rollover schema rops`; steels: `rollover\n"
+        "list steels`, or {base: S355, yield_strength: ...}. Of a frame whose side-load curve was measured, `mounts`\n"
+        "with that stiffness and yield stand in the place of `feet`, as in vehicles/rops/two_post_rear_3t.yaml."
     )
     rops = document.load(document.shipped_folder() / "vehicles" / FRAME, Rops)
     return {f"{name}.yaml": document.annotated(rops, head, {"members.material": "S355"})}
