@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +16,7 @@ from rollover.dynamics.frame.push import at_rest, let_go
 from rollover.dynamics.frame.yielding import yielding
 from rollover.spec.connector import Connector
 from rollover.spec.sections import Section
+from rollover.spec.steel import Steel
 from tests.physics.frames import MILD, STIFF, TUBE, bar, portal, pushed
 
 M_P = TUBE.properties.plastic_h * STIFF.yield_strength
@@ -265,3 +267,46 @@ def test_hinges_are_told_in_the_order_in_which_they_form() -> None:
     hinges = yielding(frame, curve)["hinges"]
     assert [h["member"] for h in hinges][:2] == ["left", "right"]  # the nearer post first
     assert all(a["deflection"] <= b["deflection"] for a, b in pairwise(hinges))
+
+
+def test_a_thin_span_hangs_like_a_rope() -> None:
+    """Two halves a with slope t between stiff ends: w = t (a - 2 l), N = E A t^2 (a - 3 l)/(2 a), F = 2 N t.
+
+    l = sqrt(E I/N): v' = t (1 - e^(-x/l) - e^(-(a-x)/l)).
+    """
+    a = 1.0
+    strong = Steel(name="wire", yield_strength=2e9, tensile_strength=2e9, uniform_strain=0.2)
+    strip = Section(plate=(100.0, 1.0))
+    span = replace(bar("span", (0.0, 0.0, 0.0), (0.0, 2.0 * a, 0.0), strip, strong), depth_towards=(0.0, 0.0, 1.0))
+    _, _, curve = pushed(
+        [span],
+        {(0.0, a, 0.0): (0.0, 0.0, -1.0)},
+        feet=[span.start, span.end],
+        most=0.04,
+        step=0.002,
+        segments=40,
+    )
+    area, inertia, w = strip.properties.area, strip.properties.second_h, curve[-1].deflection
+    stiff = 0.0
+    for _ in range(20):
+        slope = w / (a - 2.0 * stiff)
+        pull = 210e9 * area * slope**2 * (a - 3.0 * stiff) / (2.0 * a)
+        stiff = float(np.sqrt(210e9 * inertia / pull))
+    assert curve[-1].force == pytest.approx(2.0 * pull * slope, rel=0.02)
+
+
+def test_a_thrust_adds_to_the_moment_at_the_lean_of_the_post() -> None:
+    """A beam column: w = H/(N k) (tan kL - kL), k^2 = N/(E I), at a third of the buckling load."""
+    length = 2.0
+    EI = 210e9 * TUBE.properties.second_h
+    thrust = np.pi**2 * EI / (4.0 * length**2) / 3.0
+    ratio = 400.0
+    k = np.sqrt(thrust / EI)
+    expected = (thrust / ratio) / (thrust * k) * (np.tan(k * length) - k * length)
+    elastic = Steel(name="elastic", yield_strength=2e9, tensile_strength=2e9, uniform_strain=0.2)
+    post = bar("post", (0.0, 0.0, 0.0), (0.0, 0.0, length), TUBE, elastic)
+    frame, _, curve = pushed([post], {post.end: (1.0, 0.0, -ratio)}, feet=[post.start], most=0.3, step=0.005)
+    tip = 6 * frame.mesh.at["load0"]
+    sway = [p.state.u[tip] for p in curve]
+    found = float(np.interp(thrust / ratio, [p.force for p in curve], sway))
+    assert found == pytest.approx(expected, rel=0.01)
