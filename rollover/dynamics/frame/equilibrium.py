@@ -191,7 +191,8 @@ class Frame:
             whole[6 * spring.node : 6 * spring.node + 6] += f
         values = np.concatenate([K.ravel(), held_slope.ravel()])[self.kept]
         count = (2 * self.half + 1) * len(self.free)
-        band = np.bincount(self.slot, weights=values, minlength=count).reshape(-1, len(self.free))
+        band = np.asarray(np.bincount(self.slot, weights=values, minlength=count), dtype=float)
+        band = band.reshape(-1, len(self.free))
         left = replace(
             memory,
             fibre=memory.fibre.left(plastic),
