@@ -66,7 +66,7 @@ def test_a_portal_of_bars_pushed_sideways(tmp_path) -> None:
 
 
 @NEEDS
-def test_a_portal_of_bars_pushed_lengthways_off_its_middle(tmp_path) -> None:
+def test_a_portal_of_bars_pushed_lengthways(tmp_path) -> None:
     """Bending of the posts, bending and torsion of the beam between them."""
     a, high, wide = 30.0, 900.0, 800.0
     h = 0.5 * a

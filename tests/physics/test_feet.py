@@ -19,7 +19,7 @@ FRAME = document.load(FILE, Rops)
 H, WIDE = 1.61, 1.0
 
 
-def test_a_portal_stands_on_its_sway_and_its_cantilevers() -> None:
+def test_feet_are_a_portal_and_cantilevers() -> None:
     left, right = FRAME.standing
     assert (left.stiffness, left.yield_moment) == (right.stiffness, right.yield_moment)
     post = FRAME.beams[0]

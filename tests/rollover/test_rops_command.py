@@ -97,7 +97,7 @@ def test_the_same_numbers_come_as_json(tmp_path) -> None:
     assert (answer["segments"], answer["elements"]) == (6, 6 + 6 + 4 + 6 + 4 + 4) or answer["segments"] == 6
 
 
-def test_a_vehicle_and_a_scenario_bring_their_own_loads(tmp_path) -> None:
+def test_a_vehicle_or_scenario_brings_its_loads(tmp_path) -> None:
     file = written(tmp_path)
     done = call("utility_tractor", "--set", f"vehicle.rops={file}", "--out", tmp_path / "v", "--json")
     assert done.exit_code == 0, done.stderr

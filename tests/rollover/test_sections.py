@@ -97,7 +97,7 @@ def test_walls_that_buckle_are_told_by_their_class(section, strength, classes) -
 
 
 @pytest.mark.parametrize("n", [0.0, 0.2, 0.4, 0.6, 0.8])
-def test_an_axial_force_takes_its_part_of_the_plastic_moment(n) -> None:
+def test_an_axial_force_takes_its_part(n) -> None:
     bar = Section(solid=(30.0, 50.0))
     assert bar.utilisation(n, 1.0 - n * n, 0.0) == pytest.approx(1.0)  # the stress blocks of a rectangle, exactly
     # a hollow section: the middle carries N, the rest M. The clause is a straight line beside that curve: for this tube
