@@ -28,6 +28,7 @@ SITE = {  # caption -> pages, in the order of the menu
         "docs/own_law",
         "docs/plan_next_test",
         "docs/engineers_day",
+        "docs/rops_from_sections",
         "docs/inputs",
         "docs/viewing",
         "docs/commands",

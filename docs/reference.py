@@ -23,6 +23,7 @@ from rollover.spec.document.slot import Slot, slots
 from rollover.spec.rops import Rops
 from rollover.spec.standards.codes import STANDARDS, Tractor
 from rollover.spec.standards.iso_3471 import MACHINES, iso_3471_requirements
+from rollover.spec.steel import Steel
 from rollover.studies.study import Study
 
 EXAMPLE = Tractor(
@@ -36,6 +37,7 @@ ROOTS: dict[str, tuple[str, str, Sequence[type]]] = {  # page -> its title, what
         list(slot_of(scenarios.AnyVehicle).kinds.values()),
     ),
     "rops": ("Keys of a ROPS", "A file in `vehicles/rops/`, or `rops:` of a vehicle.", [Rops]),
+    "steel": ("Keys of a steel", "A file in `steels/`, or `material:` of a ROPS member.", [Steel]),
     "soil": ("Keys of a soil", "A file in `soils/`, or `ground.law:` of a scenario.", list(laws().values())),
     "study": ("Keys of a study", "A study file; its `scenario:` is a scenario.", [Study]),
     "recording": ("Keys of a recording", "The sidecar `NAME.yaml` of a recording.", [Sidecar, Column]),

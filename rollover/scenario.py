@@ -25,6 +25,7 @@ from rollover.spec.laws import laws
 from rollover.spec.rops import Rops
 from rollover.spec.stand import PendulumBlow, StaticTest, TiltTable
 from rollover.spec.standards.static_sequence import sequence
+from rollover.spec.steel import Steel
 from rollover.spec.vehicle import RigidBody, Striker, Vehicle
 from rollover.system import own_code
 
@@ -316,7 +317,7 @@ def given(scenario: str | Path | Scenario) -> tuple[Scenario, Path | None]:
     return load(path), path
 
 
-def schema(part: Literal["scenario", "vehicle", "rops", "soil"] = "scenario") -> dict[str, Any]:
+def schema(part: Literal["scenario", "vehicle", "rops", "steel", "soil"] = "scenario") -> dict[str, Any]:
     """JSON Schema of a scenario file, or of a vehicle, ROPS or soil file on its own."""
-    kind: Any = {"scenario": Scenario, "vehicle": AnyVehicle, "rops": Rops, "soil": AnyLaw}[part]
+    kind: Any = {"scenario": Scenario, "vehicle": AnyVehicle, "rops": Rops, "steel": Steel, "soil": AnyLaw}[part]
     return document.schema(kind, f"rollover {part}")

@@ -10,6 +10,7 @@ import pytest
 MISSING = {
     "ROLLOVER_DATA": "measured recordings (ROLLOVER_DATA=FOLDER, see tests/real)",
     "vulkan": "a graphics driver (Debian: mesa-vulkan-drivers)",
+    "CalculiX": "CalculiX (Debian: calculix-ccx)",
     "chromium": "a browser (Debian: chromium)",
     "rerun wheel": "the viewer, which has no wheel for this platform",
     "platform": "another platform",

@@ -37,15 +37,15 @@ def static_test(
     """
     found: list[Criterion] = []
     results = {entry["name"]: entry for entry in run.tests}
-    for load, requirement in _pairs(loads, asked):
+    for load, requirement in pairs(loads, asked):
         entry = results.get(load.name, {"status": "never began: the run ended before"})
         found.append(_load(run, load, entry, requirement, structure))
         if entry.get("overload") and requirement.source == STATIC:
-            found.append(_overload(load, entry, requirement))
+            found.append(overload(load, entry, requirement))
     return found
 
 
-def _pairs(loads: Sequence[Push], asked: Sequence[Requirement]) -> list[tuple[Push, Requirement]]:
+def pairs(loads: Sequence[Push], asked: Sequence[Requirement]) -> list[tuple[Push, Requirement]]:
     """Each requirement with the first load that it can be asked of and that none before it had."""
     found: list[tuple[Push, Requirement]] = []
     had: set[tuple[str, str]] = set()
@@ -80,7 +80,12 @@ def _load(
         simulated = min(simulated, float(run.recording[f"device/{requirement.quantity}"][entered]))
         note += f"; a part of the frame entered the clearance zone at {run.recording.time[entered]:.3f} s"
         return judged(requirement, simulated, note)
-    if done:
+    return concluded(load, entry, requirement, simulated, note)
+
+
+def concluded(load: Push, entry: Mapping[str, Any], requirement: Requirement, simulated: float, note: str) -> Criterion:
+    """What a load that kept out of the clearance zone shows of its requirement, by how it ended."""
+    if entry["status"] == "reached":
         return told(requirement, simulated, float(load.energy or load.force or 0.0), note)
     if load.until_failure and simulated >= requirement.value * (1.0 - ROUNDING):
         row = judged(requirement, simulated, note)
@@ -101,7 +106,8 @@ def _entered(run: Run, entry: Mapping[str, Any], structure: Approach | None) -> 
     return k if during.any() and before >= 0.0 else None
 
 
-def _overload(load: Push, entry: Mapping[str, Any], of: Requirement) -> Criterion:
+def overload(load: Push, entry: Mapping[str, Any], of: Requirement) -> Criterion:
+    """The overload rule after a load that was asked for an energy."""
     rule = entry["overload"]
     requirement = replace(
         of,

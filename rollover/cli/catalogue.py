@@ -16,6 +16,7 @@ from rollover.spec import channels as table
 from rollover.spec import document
 from rollover.spec.laws import laws as known_laws
 from rollover.spec.rops import Rops
+from rollover.spec.steel import Steel
 from rollover.spec.vehicle import Vehicle, pitch_inertia
 from rollover.system import own_code
 from rollover.system.errors import Fault, InputError, excerpt
@@ -111,6 +112,7 @@ TABLES: dict[str, Callable[[], list[Row]]] = {
     "studies": lambda: files("studies"),
     "vehicles": vehicles,
     "soils": lambda: files("soils"),
+    "steels": lambda: files("steels"),
     "laws": laws,
     "effects": effects,
     "channels": channels,
@@ -119,7 +121,7 @@ TABLES: dict[str, Callable[[], list[Row]]] = {
 
 
 def check(name: str) -> str:
-    """Validate a file and say what it is: scenario, study, vehicle, ROPS, soil, baseline, profile, law or effect.
+    """Validate a file and say what it is: scenario, study, vehicle, ROPS, steel, soil, baseline, profile, law, effect.
 
     Raises `InputError`.
     """
@@ -151,7 +153,8 @@ def check(name: str) -> str:
     for what, annotation, meant in (
         ("soil", scenarios.AnyLaw, kind in known_laws()),
         ("vehicle", scenarios.AnyVehicle, kind in document.slot_of(scenarios.AnyVehicle).kinds),
-        ("rops", Rops, "mounts" in keys),
+        ("rops", Rops, bool({"mounts", "feet"} & set(keys))),
+        ("steel", Steel, "yield_strength" in keys),
     ):
         if meant:
             document.load(path, annotation)

@@ -232,7 +232,7 @@ def _rops(scenario: Scenario, s: States, bodies: tuple[Body, ...], row: dict[str
     world = resultant[:, c.R_NORMAL : c.R_NORMAL + 3] + resultant[:, c.R_TANGENT : c.R_TANGENT + 3]
     force = np.einsum("nji,nj->ni", R, world)
     found = {"rops/force": np.linalg.norm(world, axis=1)}
-    joined = [f"mount/{m.name}" for m in vehicle.rops.mounts] + [f"hinge/{m.name}" for m in vehicle.rops.hinges]
+    joined = [f"mount/{m.name}" for m in vehicle.rops.standing] + [f"hinge/{m.name}" for m in vehicle.rops.hinges]
     for k, axis in enumerate("xyz"):
         found[f"rops/force_{axis}"] = force[:, k]
         for m, name in enumerate(joined):

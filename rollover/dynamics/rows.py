@@ -130,7 +130,7 @@ def mount_rows(
         return np.zeros((0, c.MOUNT_COLUMNS)), np.zeros((0, 2), dtype=np.int64)
     rows, pairs = [], []
     for joints, below, above in (
-        (vehicle.rops.mounts, "chassis", "rops"),
+        (vehicle.rops.standing, "chassis", "rops"),
         (vehicle.rops.hinges, "rops", "rops_upper"),
     ):
         for joint in joints:

@@ -35,7 +35,7 @@ class RopsElasticity(Effect):
     def changes(self, scenario: Any) -> Mapping[str, Any]:
         """Stiffness and damping of every mount."""
         rops = scenario.vehicle.rops if isinstance(scenario.vehicle, Vehicle) else None
-        if self.stiffness is None or rops is None:
+        if self.stiffness is None or rops is None or not rops.mounts:  # feet follow from sections
             return {}
         ratio = self.stiffness / sum(mount.stiffness[1] for mount in rops.mounts)
         found: dict[str, Any] = {}
@@ -69,7 +69,7 @@ class RopsPlasticity(Effect):
     def changes(self, scenario: Any) -> Mapping[str, Any]:
         """The yield force along y of every mount."""
         rops = scenario.vehicle.rops if isinstance(scenario.vehicle, Vehicle) else None
-        if self.yield_force is None or rops is None:
+        if self.yield_force is None or rops is None or not rops.mounts:  # feet follow from sections
             return {}
         whole = sum(mount.stiffness[1] for mount in rops.mounts)
         found: dict[str, Any] = {}

@@ -7,12 +7,17 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.quantity import Quantity, parameters
+from ground.kinds import ByKind
+from ground.quantity import Later, Quantity, parameters
+from rollover.spec.beam import Beam
 from rollover.spec.connector import Connector
+from rollover.spec.feet import Foot, springs
 from rollover.spec.inertia import MassProperties
 from rollover.spec.mechanism import Joint, free_motions, sentence
 from rollover.spec.provenance import Provenance
-from rollover.spec.shapes import Point, Shape
+from rollover.spec.shapes import Box, Disc, Point, Points, Shape, Tube
+
+Member = Annotated[Box | Tube | Disc | Points | Beam, ByKind(usual="beam")]
 
 
 @parameters
@@ -50,7 +55,7 @@ class Upper:
 
     body: MassProperties
     hinges: Annotated[tuple[Connector, ...], "between the lower and the upper part"]
-    members: Annotated[tuple[Shape, ...], "tubes and boxes of the upper part that can touch the ground"]
+    members: Annotated[tuple[Member, ...], "tubes, beams and boxes of the upper part that can touch the ground"]
 
 
 @parameters
@@ -59,8 +64,11 @@ class Rops:
 
     frame: Literal["two-post-rear", "two-post-front", "four-post", "cab"]
     body: Annotated[MassProperties, "of the frame; without its upper part if there is one"]
-    mounts: Annotated[tuple[Connector, ...], "between the chassis and the frame"]
-    members: Annotated[tuple[Shape, ...], "tubes and boxes that can touch the ground"]
+    mounts: Annotated[tuple[Connector, ...], "between the chassis and the frame, as stiff and strong as said here"] = ()
+    feet: Annotated[
+        tuple[Foot, ...], "where beams stand on the chassis: as stiff and strong as their sections and steel", Later()
+    ] = ()
+    members: Annotated[tuple[Member, ...], "tubes, beams with a section and boxes that can touch the ground"]
     upper: Upper | None = None
     corner: Annotated[Point, Quantity("m", "upper corner whose deflection is reported; the left one, y > 0")]
     other_corners: Annotated[
@@ -71,10 +79,11 @@ class Rops:
 
     def validate(self) -> None:
         """Refuse a frame that nothing holds or that its joints leave a motion, and joints that share a name."""
-        for what, joints in (("mounts", self.mounts), ("upper.hinges", self.hinges)):
+        for what, joints in (("mounts", self.standing), ("upper.hinges", self.hinges)):
             names = [m.name for m in joints]
             if not names and (what == "mounts" or self.upper is not None):
-                raise ValueError(f"{what}: none given; at least one")
+                feet = ", or feet of members with a section" if what == "mounts" else ""
+                raise ValueError(f"{what}: none given; at least one{feet}")
             if len(set(names)) != len(names):
                 raise ValueError(f"{what}: two share a name, got {names}; each name once")
         if free := free_motions({name: body for name, (body, _) in self.parts.items()}, self.joints):
@@ -88,7 +97,11 @@ class Rops:
     @property
     def joints(self) -> tuple[Joint, ...]:
         """Mounts, then hinges, with the parts that they join."""
-        sides = (("mounts", "chassis", "rops", self.mounts), ("upper.hinges", "rops", "rops_upper", self.hinges))
+        sides = (
+            ("mounts", "chassis", "rops", self.mounts),
+            ("feet", "chassis", "rops", self.standing[len(self.mounts) :]),
+            ("upper.hinges", "rops", "rops_upper", self.hinges),
+        )
         return tuple(
             Joint(path=f"{path}.{c.name}", below=below, above=above, connector=c)
             for path, below, above, connectors in sides
@@ -97,13 +110,29 @@ class Rops:
 
     @property
     def connectors(self) -> tuple[Connector, ...]:
-        """Mounts, then hinges."""
-        return self.mounts + self.hinges
+        """Mounts and feet, then hinges."""
+        return self.standing + self.hinges
+
+    @property
+    def standing(self) -> tuple[Connector, ...]:
+        """Mounts, then feet as the springs that stand for their posts."""
+        return self.mounts + (springs(self.feet, self.beams, self.body) if self.feet else ())
 
     @property
     def parts(self) -> dict[str, tuple[MassProperties, tuple[Shape, ...]]]:
         """Bodies of the frame by name, from below: mass properties and members."""
-        found = {"rops": (self.body, self.members)}
+        found = {"rops": (self.body, shapes(self.members))}
         if self.upper is not None:
-            found["rops_upper"] = (self.upper.body, self.upper.members)
+            found["rops_upper"] = (self.upper.body, shapes(self.upper.members))
         return found
+
+    @property
+    def beams(self) -> tuple[Beam, ...]:
+        """Members that have a section, of both parts."""
+        upper = () if self.upper is None else self.upper.members
+        return tuple(m for m in (*self.members, *upper) if isinstance(m, Beam))
+
+
+def shapes(members: tuple[Member, ...]) -> tuple[Shape, ...]:
+    """What of members can touch the ground."""
+    return tuple(m.tube if isinstance(m, Beam) else m for m in members)

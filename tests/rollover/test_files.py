@@ -26,6 +26,7 @@ from rollover.spec.document import Leaf
 from rollover.spec.provenance import Provenance
 from rollover.spec.rops import Rops
 from rollover.spec.shapes import Tube
+from rollover.spec.steel import Steel
 from rollover.spec.vehicle import Striker, Vehicle, chassis_of, pitch_inertia
 
 FOLDER = document.shipped_folder()
@@ -33,6 +34,7 @@ SIGNALS = sorted((FOLDER / "signals").glob("*.csv"))  # with a sidecar each
 FILES = sorted(p for p in FOLDER.rglob("*.yaml") if p.name != "excluded.yaml" and p.parent.name != "signals")
 SCENARIOS = [path for path in FILES if path.parent == FOLDER]
 VEHICLES = [path for path in FILES if path.parent.name == "vehicles"]
+STEELS = [path for path in FILES if path.parent.name == "steels"]
 SOILS = [path for path in FILES if path.parent.name == "soils"]
 FRAMES = [path for path in FILES if path.parent.name == "rops"]
 STUDIES = [path for path in FILES if path.parent.name == "studies"]
@@ -50,15 +52,20 @@ def test_there_are_files_of_every_sort() -> None:
     assert more <= {p.stem for p in VEHICLES}
     assert {document.load(p, Rops).frame for p in FRAMES} == {"two-post-rear", "two-post-front", "four-post", "cab"}
     assert {"natural_clay"} <= {p.stem for p in SOILS}
-    assert set(FILES) == {*SCENARIOS, *VEHICLES, *SOILS, *FRAMES, *STUDIES, *BASELINES}
+    assert set(FILES) == {*SCENARIOS, *VEHICLES, *SOILS, *STEELS, *FRAMES, *STUDIES, *BASELINES}
     assert {"bank_slope_speed", "soil_side_overturn", "rops_stiffness"} <= {p.stem for p in STUDIES}
 
 
 @pytest.mark.parametrize("path", FILES, ids=name_of)
 def test_every_file_is_in_order(path: Path) -> None:
-    sort = {"vehicles": "vehicle", "soils": "soil", "rops": "rops", "baselines": "baseline", "studies": "study"}.get(
-        path.parent.name, "scenario"
-    )
+    sort = {
+        "vehicles": "vehicle",
+        "soils": "soil",
+        "rops": "rops",
+        "steels": "steel",
+        "baselines": "baseline",
+        "studies": "study",
+    }.get(path.parent.name, "scenario")
     assert catalogue.check(str(path)) == sort
 
 
@@ -115,9 +122,9 @@ def idle(thing: Any, provenance: tuple[Provenance, ...]) -> list[str]:
     return [p for p in prefixes if not any(path == p or path.startswith(f"{p}.") for path in paths)]
 
 
-@pytest.mark.parametrize("path", [*VEHICLES, *FRAMES], ids=name_of)
+@pytest.mark.parametrize("path", [*VEHICLES, *FRAMES, *STEELS], ids=name_of)
 def test_every_number_says_where_it_comes_from(path: Path) -> None:
-    thing = document.load(path, Rops if path in FRAMES else scenarios.AnyVehicle)
+    thing = document.load(path, Rops if path in FRAMES else Steel if path in STEELS else scenarios.AnyVehicle)
     assert uncovered(thing, thing.provenance) == []
     assert idle(thing, thing.provenance) == []
     assert all(len(entry.source) > 30 for entry in thing.provenance)

@@ -48,6 +48,7 @@ RUN = [
     "docs/estimation.md",
     "docs/integrators.md",
     "docs/plan_next_test.md",
+    "docs/rops_from_sections.md",
     "rollover/README.md",
 ]
 ELSEWHERE = {  # page -> its blocks that are not run here, and why

@@ -106,7 +106,10 @@ def test_the_annotated_objects_come_back_to_the_last_bit(tmp_path: Path) -> None
         for name, text in templates.written(kind, kind).items():
             (tmp_path / name).write_text(text, encoding="utf-8")
     vehicle = document.load(document.find("utility_tractor", "vehicles"), AnyVehicle)
-    rops = document.load(document.shipped_folder() / "vehicles" / templates.ROPS, Rops)
+    frames = document.shipped_folder() / "vehicles"
+    rops, mounted = (document.load(frames / name, Rops) for name in (templates.FRAME, templates.ROPS))
+    (tmp_path / "mounted.yaml").write_text(document.annotated(mounted, "", {}), encoding="utf-8")
+    assert document.load(tmp_path / "mounted.yaml", Rops) == mounted
     assert load(tmp_path / "scenario.yaml") == load("side_overturn")
     assert document.load(tmp_path / "vehicle.yaml", AnyVehicle) == vehicle
     assert document.load(tmp_path / "rops.yaml", Rops) == rops

@@ -40,7 +40,7 @@ def clearance_figure(run: Run) -> Figure | None:
             for shape in vehicle.outline
             if isinstance(shape, Box)
         ]
-        for member in vehicle.rops.members:
+        for member in vehicle.rops.parts["rops"][1]:
             line = _edges(member)
             moved = line @ turn.T + shift
             shapes += [

@@ -61,7 +61,7 @@ def _bodies(run: Run, vehicle: Vehicle) -> dict[str, list[Array]]:
     boxes = [_corners(shape) for shape in vehicle.outline if isinstance(shape, Box)]
     found = {"chassis": [np.vstack(boxes)] if boxes else []}
     if vehicle.rops is not None and "rops" in run.motion:
-        members = [m for m in vehicle.rops.members if isinstance(m, Tube)]
+        members = [m for m in vehicle.rops.parts["rops"][1] if isinstance(m, Tube)]
         found["rops"] = [np.array([m.start, m.end]) for m in members]
     return found
 

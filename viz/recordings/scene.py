@@ -103,7 +103,7 @@ def _rops(rops: Rops) -> list[Part]:
     found: list[Part] = []
     for (body, (_, members)), colour in zip(rops.parts.items(), (FRAME, UPPER), strict=False):
         found += _frame(members, body_path(body), colour)
-    for below, joints, name in (("chassis", rops.mounts, "rops_mounts"), ("rops", rops.hinges, "hinges")):
+    for below, joints, name in (("chassis", rops.standing, "rops_mounts"), ("rops", rops.hinges, "hinges")):
         if joints:
             places = np.array([m.position for m in joints])
             radii = np.full(len(places), 0.06)

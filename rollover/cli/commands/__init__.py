@@ -22,6 +22,7 @@ from rollover.cli.commands import plan
 from rollover.cli.commands import prove
 from rollover.cli.commands import stability
 from rollover.cli.commands import rolling
+from rollover.cli.commands import rops
 from rollover.cli.commands import study
 
 __all__ = [
@@ -39,6 +40,7 @@ __all__ = [
     "regress",
     "rolling",
     "root",
+    "rops",
     "run",
     "schema",
     "stability",

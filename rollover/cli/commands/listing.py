@@ -10,7 +10,7 @@ import typer
 from rollover.cli.commands.common import AsJson, answering, app, manual
 from rollover.system.errors import Fault, InputError, hint
 
-LISTED = ("scenarios", "studies", "vehicles", "soils", "laws", "effects", "channels", "importers", "paths")
+LISTED = ("scenarios", "studies", "vehicles", "soils", "steels", "laws", "effects", "channels", "importers", "paths")
 
 
 @app.command(

@@ -10,7 +10,7 @@ import typer
 from rollover.cli.commands.common import AsJson, answering, app, manual
 from rollover.system.errors import Fault, InputError, hint
 
-PARTS = ("scenario", "vehicle", "rops", "soil", "study", "recording", "profile")
+PARTS = ("scenario", "vehicle", "rops", "steel", "soil", "study", "recording", "profile")
 
 
 @app.command(epilog=manual("schema > scenario.schema.json", writes="nothing; the schema goes to standard output."))

@@ -1,5 +1,6 @@
 """What people read while a command works and when it is done: progress, tables, sentences. The only home of rich."""
 
+from rollover.cli.console.frames import rops
 from rollover.cli.console.plans import plan
 from rollover.cli.console.recordings import calibration, comparison, diagnosis, rolling, stability
 from rollover.cli.console.runs import regression, report
@@ -19,6 +20,7 @@ __all__ = [
     "regression",
     "report",
     "rolling",
+    "rops",
     "say",
     "stability",
     "tell",

@@ -82,12 +82,7 @@ def _stand(out: Console, run: Run) -> None:
 
     found = findings(run.tests)
     assert found is not None
-    table = Table(box=None, pad_edge=False)
-    for k, heading in enumerate(found.headings):
-        table.add_column(heading, justify="left" if k < found.words else "right")
-    for row in found.rows:
-        table.add_row(*row)
-    out.print(table)
+    out.print(terminal.table(found.headings, found.rows, words=found.words))
     out.print(f"{found.sentence}.", style="bold")
     out.print()
 

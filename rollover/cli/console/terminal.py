@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 
 from rollover.system.errors import excerpt, sentence
@@ -110,3 +111,13 @@ def readable(value: float | None, unit: str) -> str:
     if value is None or value != value:
         return "-"
     return f"{value * READABLE.get(unit, (unit, 1.0))[1]:.4g}"
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, words: int) -> Table:
+    """A table of which the first `words` columns are text, the others numbers."""
+    found = Table(box=None, pad_edge=False)
+    for k, heading in enumerate(headings):
+        found.add_column(heading, justify="left" if k < words else "right")
+    for row in rows:
+        found.add_row(*row)
+    return found

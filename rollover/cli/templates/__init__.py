@@ -15,6 +15,7 @@ from rollover.spec import document
 from rollover.spec.rops import Rops
 
 VEHICLE, ROPS = "utility_tractor", "rops/two_post_rear_3t.yaml"
+FRAME = "rops/two_post_rear_tubes_3t.yaml"
 
 
 def written(kind: str, name: str) -> Mapping[str, str]:
@@ -46,13 +47,15 @@ def _vehicle(name: str) -> Mapping[str, str]:
 
 def _rops(name: str) -> Mapping[str, str]:
     head = (
-        f"{name}: a two-post ROPS at the rear of a tractor of 3000 kg, to be replaced by your own numbers.\n"
-        f"Check: rollover check {name}.yaml   Use: rops: {name}.yaml in a vehicle, or\n"
-        f"rollover run side_overturn --set vehicle.rops={name}.yaml\n"
-        "A key with a default may be left out."
+        f"{name}: a two-post ROPS at the rear of a tractor of 3000 kg, to be replaced by your own tubes.\n"
+        f"Check: rollover check {name}.yaml   What it carries: rollover rops {name}.yaml --mass 3000\n"
+        f"Use: rops: {name}.yaml in a vehicle, or rollover run side_overturn --set vehicle.rops={name}.yaml\n"
+        "A key with a default may be left out. Other sections and members: `rollover schema rops`; steels: `rollover\n"
+        "list steels`, or {base: S355, yield_strength: ...}. Of a frame whose side-load curve was measured, `mounts`\n"
+        "with that stiffness and yield stand in the place of `feet`, as in vehicles/rops/two_post_rear_3t.yaml."
     )
-    rops = document.load(document.shipped_folder() / "vehicles" / ROPS, Rops)
-    return {f"{name}.yaml": document.annotated(rops, head, {})}
+    rops = document.load(document.shipped_folder() / "vehicles" / FRAME, Rops)
+    return {f"{name}.yaml": document.annotated(rops, head, {"members.material": "S355"})}
 
 
 def _study(name: str) -> Mapping[str, str]:

@@ -15,7 +15,7 @@ from rollover.system.errors import Fault, InputError, hint, nearest
 BASE = "base"
 ENDINGS = (".yaml", ".yml")
 GRIDS = (".csv", ".npy")
-SHELVES = ("", "vehicles", "soils")  # of shipped files, whose names without an ending may be used anywhere
+SHELVES = ("", "vehicles", "soils", "steels")  # of shipped files, whose names without an ending may be used anywhere
 
 
 def shipped_folder() -> Path:
@@ -92,7 +92,7 @@ def expand(node: Node, slot: Slot, chain: tuple[Path, ...], path: str = "", unde
     mapping over a list goes to its elements by name or place. `chain` holds the files that are being read, to find one
     that includes itself.
     """
-    if isinstance(node.value, str) and slot.kinds and (node.value.endswith(ENDINGS) or _file(node) is not None):
+    if isinstance(node.value, str) and slot.kinds and _means_file(node):
         return _included(node, slot, chain, path)
     if slot.grid and isinstance(node.value, str) and node.value.endswith(GRIDS):
         return _grid(node, path)
@@ -178,6 +178,14 @@ def _file(node: Node) -> Path | None:
         name = Path(f"{name}.yaml")
         folders = (node.place.folder, *(shipped_folder() / shelf for shelf in SHELVES))
     return next((f / name for f in folders if (f / name).is_file()), None)
+
+
+def _means_file(node: Node) -> bool:
+    """Whether a text is the name of a file, or nearly that of a shipped one: a slip of the pen is told as one."""
+    said = str(node.value)
+    if said.endswith(ENDINGS) or _file(node) is not None:
+        return True
+    return bool(nearest(said, [p.stem for shelf in SHELVES for p in (shipped_folder() / shelf).glob("*.yaml")]))
 
 
 def _included(node: Node, slot: Slot, chain: tuple[Path, ...], path: str) -> Node:

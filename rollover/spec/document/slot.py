@@ -101,7 +101,7 @@ class Slot:
     def allowed(self, kind: object = None) -> str:
         """What is allowed here, in words."""
         words = self._allowed(kind)
-        return f"{words}, or null" if self.optional else words
+        return f"{words.rstrip(',')}, or null" if self.optional else words
 
     def _allowed(self, kind: object) -> str:
         if self.grid:

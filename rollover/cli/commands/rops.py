@@ -1,0 +1,85 @@
+"""`rollover rops`: a frame of members with sections alone, under the loads of a static test."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rollover.cli.commands.common import (
+    FAILED,
+    AsJson,
+    Force,
+    Setting,
+    answering,
+    app,
+    manual,
+    settings,
+)
+
+JSON, PAGE = "rops.json", "report.html"
+
+
+@app.command(
+    "rops",
+    epilog=manual(
+        "rops welded_tubes --mass 3000",
+        "rops static_rops_test --set vehicle.rops=FRAME.yaml",
+        writes=f"{JSON}, {PAGE}.",
+    ),
+)
+@answering
+def rops_(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="A ROPS, vehicle or scenario file, or the name of a shipped one.", metavar="ROPS|VEHICLE|SCENARIO"
+        ),
+    ],
+    mass: Annotated[
+        float | None, typer.Option(help="Of the vehicle, kg: needed for a ROPS by itself.", min=1.0)
+    ] = None,
+    segments: Annotated[int, typer.Option(help="Elements to a member.", min=2, max=200)] = 12,
+    clamped: Annotated[bool, typer.Option("--clamped", help="Feet held still instead of on their mounts.")] = False,
+    set_: Setting = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/rops/NAME")] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Load over deflection of a frame given by its sections: the static sequence, hinges, collapse, verdict."""
+    from rollover.assessment import results
+    from rollover.assessment.frame_account import FORMAT, account, file_of, scenario_of, told
+    from rollover.assessment.frame_test import frame_test
+    from rollover.cli import console
+    from rollover.spec import document
+    from viz.pages.rops import page
+
+    chosen = scenario_of(name, mass)
+    if set_:
+        chosen = chosen.replaced(settings(set_), origin="--set")
+    folder = out or Path("out", "rops", Path(name).stem)
+    about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), **chosen.own_code}
+    about["origin"] = results.origin(file_of(name), folder, set_ or [])
+    results.claim_account(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
+    try:
+        with told(file_of(name)), console.counting("loads") as show:
+            found = frame_test(chosen, segments=segments, clamped=clamped, progress=show)
+    except ArithmeticError as e:
+        console.say(f"{name}: {e}")
+        raise typer.Exit(FAILED) from None
+    answer = account(found, about)
+    words = [] if mass is None else ["--mass", f"{mass:g}"]
+    words += ["--segments", str(segments)] if segments != 12 else []
+    words += ["--clamped"] if clamped else []
+    words += [word for s in set_ or [] for word in ("--set", s)]
+    text = page(answer, command=" ".join(map(shlex.quote, ["rollover", "rops", name, *words])))
+    with results.whole(folder) as part:
+        results.write_json(part / JSON, answer)
+        (part / PAGE).write_text(text, encoding="utf-8")
+    if as_json:
+        print(json.dumps(answer, indent=2))
+    else:
+        console.rops(answer, str(folder))

@@ -1,0 +1,133 @@
+"""The page of a frame alone: verdict, load over deflection, the frame as it stands afterwards, hinges, members."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rollover.assessment.stand_results import findings
+from viz.content.blocks import Block, Cell, Figure, Footer, Headline, Note, Section, Table
+from viz.figures import plots
+from viz.figures.plots import Curve, Role
+from viz.pages.page import render
+
+ROLES: tuple[Role, ...] = ("first", "second", "third", "muted", "ink")
+HINGES = ("load", "at, mm", "force, kN", "where", "m from its start", "moment, kN m")
+MEMBERS = (
+    "member",
+    "section",
+    "steel",
+    "class",
+    "A, cm2",
+    "W_pl, cm3",
+    "N_pl, kN",
+    "M_pl depth, kN m",
+    "M_pl width, kN m",
+)
+
+
+def page(answer: Mapping[str, Any], *, command: str) -> str:
+    """HTML of the account that `rollover rops` writes."""
+    done = [e for e in answer["tests"] if "curve" in e]
+    found = findings(answer["tests"])
+    bad = answer["verdict"] == "not met"
+    head = Headline(
+        sentence=f"The static sequence is {answer['verdict']}."
+        if answer["verdict"] != "no verdict"
+        else "The static sequence has no verdict.",
+        detail=f"{answer['elements']} elements, {answer['segments']} to a member; feet: {answer['base']}.",
+        state="fail" if bad else "warn" if answer["warnings"] else "",
+    )
+    blocks: list[Block] = [Section(title="Load over deflection", blocks=[_curves(done), *_results(found)])]
+    blocks.append(Section(title="Against the standard", blocks=[_criteria(answer)]))
+    rows = [_hinge(e["name"], h) for e in done for h in e["hinges"]]
+    rows += [
+        [e["name"], f"{1e3 * m['deflection']:.0f}", f"{1e-3 * m['force']:.1f}", f"mount {m['name']} yields", "-", "-"]
+        for e in done
+        for m in e["mounts"]
+    ]
+    if rows:
+        blocks.append(
+            Section(title="Where it yields, in order", blocks=[Table(columns=HINGES, rows=rows, numeric=(1, 2, 4, 5))])
+        )
+    blocks.append(Section(title="Members", blocks=[_members(answer)]))
+    notes: list[Block] = [Note(text=said, warning=True) for said in answer["warnings"]]
+    blocks.append(Section(title="In words", blocks=[*notes, Note(text=answer["method"])]))
+    return render(
+        title=answer["vehicle"],
+        subtitle="ROPS alone under a static test",
+        headline=head,
+        blocks=blocks,
+        footer=Footer(command=command, scenario_hash=answer["scenario_hash"], versions=answer["versions"]),
+    )
+
+
+def _curves(done: list[Mapping[str, Any]]) -> Figure:
+    curves = []
+    for k, e in enumerate(done):
+        x, y = np.array(e["curve"]).T
+        curves.append(
+            Curve(name=f"{e['name']}, from {e['come_from']}", x=1e3 * x, y=1e-3 * y, role=ROLES[k % len(ROLES)])
+        )
+    points = [("", 1e3 * h["deflection"], 1e-3 * h["force"]) for e in done for h in e["hinges"]]
+    svg = plots.xy(curves, across="deflection, mm", label="force, kN", points=points)
+    return Figure(svg=svg, caption="Each load from where the one before left the frame; dots are plastic hinges.")
+
+
+def _results(found: Any) -> list[Block]:
+    if found is None:
+        return []
+    numeric = range(found.words, len(found.headings) - 1)
+    table = Table(columns=found.headings, rows=[list(row) for row in found.rows], numeric=numeric)
+    return [table, Note(text=f"{found.sentence}.")]
+
+
+def _criteria(answer: Mapping[str, Any]) -> Table:
+    rows: list[list[str | Cell]] = []
+    for c in answer["criteria"]:
+        r = c["requirement"]
+        state = {"met": "pass", "not met": "fail"}.get(c["verdict"], "warn")
+        unit = {"J": ("kJ", 1e-3), "N": ("kN", 1e-3), "1": ("%", 100.0)}[r["unit"]]
+        rows.append(
+            [
+                f"{r['standard']}: {r['name']}",
+                f"{unit[1] * r['value']:.4g} {unit[0]}",
+                f"{unit[1] * c['simulated']:.4g} {unit[0]}",
+                Cell(text=c["verdict"], state=state),  # type: ignore[arg-type]
+                c["note"],
+            ]
+        )
+    return Table(columns=("requirement", "asked", "reached", "verdict", "how"), rows=rows, numeric=(1, 2))
+
+
+def _hinge(load: str, h: Mapping[str, Any]) -> list[str | Cell]:
+    return [
+        load,
+        f"{1e3 * h['deflection']:.0f}",
+        f"{1e-3 * h['force']:.1f}",
+        h["member"],
+        f"{h['place']:.2f} of {h['of']:.2f}",
+        f"{1e-3 * h['moment']:.2f}",
+    ]
+
+
+def _members(answer: Mapping[str, Any]) -> Table:
+    rows: list[list[str | Cell]] = []
+    for m in answer["members"]:
+        worst = max(m["class"]["h"], m["class"]["b"])
+        rows.append(
+            [
+                m["name"],
+                f"{m['section']}{', ' + m['corners'] if m['corners'] else ''}",
+                m["steel"],
+                Cell(text=str(worst), state="" if worst == 1 else "warn"),
+                f"{1e4 * m['area']:.2f}",
+                f"{1e6 * m['plastic_h']:.1f}",
+                f"{1e-3 * m['plastic_force']:.0f}",
+                f"{1e-3 * m['plastic_moment_depth']:.2f}",
+                f"{1e-3 * m['plastic_moment_width']:.2f}",
+            ]
+        )
+    return Table(columns=MEMBERS, rows=rows, numeric=range(3, 9))
