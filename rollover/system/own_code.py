@@ -19,7 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from rollover.system.errors import Fault, InputError, excerpt
+from rollover.system.errors import Fault, InputError, cured, excerpt
 
 KINDS = {"effects": "ROLLOVER_EFFECTS", "laws": "ROLLOVER_LAWS", "models": "ROLLOVER_MODELS"}
 
@@ -70,7 +70,8 @@ def _load(kind: str, path: Path, examine: Callable[[ModuleType], str]) -> None:
         module = importlib.import_module(name)
     except Exception as e:
         sys.modules.pop(name, None)
-        raise InputError(Fault(file=str(path), line=_line(e, path), message=_worded(e))) from e
+        fault = Fault(file=str(path), line=_line(e, path), message=_worded(e))
+        raise InputError(cured(fault, "a file that Python imports is needed")) from e
     if wrong := examine(module):
         del sys.modules[name]
         raise InputError(Fault(file=str(path), message=wrong))
