@@ -66,6 +66,9 @@ def _load(kind: str, path: Path, examine: Callable[[ModuleType], str]) -> None:
         return
     if not path.is_file():
         raise InputError(Fault(file=str(path), message=f"no such file of {kind}; a Python file is needed"))
+    if path.suffix != ".py":
+        message = f"not a Python file of {kind}, got {path.name!r}; a name that ends in .py is needed"
+        raise InputError(Fault(file=str(path), message=message))
     try:
         module = importlib.import_module(name)
     except Exception as e:

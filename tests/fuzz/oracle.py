@@ -42,6 +42,9 @@ _BARE = re.compile(
 )
 
 
+_OWN_MODULES = tuple(f"rollover_{kind}_" for kind in own_code.KINDS)
+
+
 class Hang(BaseException):
     """An input took longer than it may."""
 
@@ -210,7 +213,7 @@ def _forget_own_code(environment: dict[str, str]) -> None:
     """Files of one's own are those of a process: the next input is that of another."""
     os.environ.clear()
     os.environ.update(environment)
-    for name in [n for n in sys.modules if n.startswith(tuple(f"rollover_{kind}_" for kind in own_code.KINDS))]:
+    for name in [n for n in sys.modules if n.startswith(_OWN_MODULES)]:
         del sys.modules[name]
 
 
