@@ -81,8 +81,9 @@ def means_over_wraps(recording: Recording) -> dict[str, Mask]:
     turned = on_other_branch(recording)
     to_another = turned[1:] != turned[:-1]
     crossing = np.concatenate([[False], to_another]) | np.concatenate([to_another, [False]])
+    none = np.zeros(recording.time.size, dtype=bool)
     return {
-        name: across_wraps(recording[name]) & ~(crossing if name in ANGLES else False)
+        name: across_wraps(recording[name]) & ~(crossing if name in ANGLES else none)
         for name in sorted(PERIODIC.intersection(recording.channels))
     }
 

@@ -161,7 +161,8 @@ def test_what_cannot_be_written_is_said_before_the_work(
         monkeypatch.setattr(work, lambda *a, **k: pytest.fail("it was worked out first"))
     result = rollover(*words)
     assert result.exit_code == WRONG
-    assert len(result.stderr.splitlines()) == 1
+    lines = [line for line in result.stderr.splitlines() if "ompil" not in line]  # said once per installation
+    assert len(lines) == 1
     assert "out" in result.stderr
     assert "ead-only file system" in result.stderr
 
