@@ -55,8 +55,12 @@ class Quantity:
 
     def admits(self, value: float) -> bool:
         """Whether `value` is finite and within the bounds."""
+        try:
+            finite = math.isfinite(value)
+        except OverflowError:  # an integer of 309 digits and more
+            return False
         return (
-            math.isfinite(value)
+            finite
             and (self.above is None or value > self.above)
             and (self.least is None or value >= self.least)
             and (self.most is None or value <= self.most)

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 FORMS = "{time: [...], value: [...]} or {file: NAME, channel: NAME}"
 MOST_SAMPLES = 50_000  # each costs 0.14 ms where a result's scenario is written: 7 s
 WHOLE = 1.5  # longest over median interval of a clock that jitters; where one sample is missing it is 2
+PROFILES = (".yaml", ".yml")
+WHAT = {"file": "recording", "profile": "profile"}
 SI = {"deg": ("rad", np.degrees)}  # unit of a key that is not SI: the SI unit, and from there to it
 
 
@@ -103,16 +105,20 @@ def _read(node: Node, path: str, unit: str) -> Node | None:
 
 
 def _recording(given: SignalFile, keys: Mapping[str, Node], path: str) -> Recording:
+    from rollover.recording.importers import ENDINGS, read_recording  # slow to import, and few scenarios read a file
+
+    recordings = tuple(e for e in ENDINGS if e not in PROFILES)
     found: dict[str, Path | None] = {}
-    for key, name in (("file", given.file), ("profile", given.profile)):
+    for key, name, endings in (("file", given.file, recordings), ("profile", given.profile, PROFILES)):
         if name is None:
             continue
+        if not name.lower().endswith(endings):  # somebody else's scenario names it: no file of any kind
+            what = f"not the name of a {WHAT[key]}, got {name!r}"
+            raise keys[key].place.fault(f"{path}.{key}", f"{what}; one that ends in {', '.join(endings)} is needed")
         found[key] = beside(name, keys[key])
         if found[key] is None:
             message = f"no such file, got {name!r}; a file beside this one is needed"
             raise keys[key].place.fault(f"{path}.{key}", message)
-    from rollover.recording.importers import read_recording  # slow to import, and few scenarios read a file
-
     file = found["file"]
     assert file is not None  # refused above
     return read_recording(file, profile=found.get("profile"), test=given.test or "")

@@ -70,15 +70,28 @@ def continuous(recording: Recording) -> Recording:
     return replace(recording, channels={**own, **changed}, notes=(*recording.notes, *notes))
 
 
-def _without_means(recording: Recording) -> Recording:
-    """The recording with gaps for samples that are means over a wrap; one on the other branch is none."""
-    channels, notes = dict(recording.channels), list(recording.notes)
+def on_other_branch(recording: Recording) -> Mask:
+    """Which samples (n,) are on the other branch of roll, pitch, yaw than the one that goes on along time."""
     rpy = _columns(recording, ANGLES)
-    turned = np.nanmax(np.abs(wrapped(one_branch(rpy) - rpy)), axis=1, initial=0.0) > SAME
+    return np.asarray(np.nanmax(np.abs(wrapped(one_branch(rpy) - rpy)), axis=1, initial=0.0) > SAME)
+
+
+def means_over_wraps(recording: Recording) -> dict[str, Mask]:
+    """Which samples (n,) of each angle that turns whole turns are means over a wrap; where the branch changes, none."""
+    turned = on_other_branch(recording)
     to_another = turned[1:] != turned[:-1]
     crossing = np.concatenate([[False], to_another]) | np.concatenate([to_another, [False]])
-    for name in sorted(PERIODIC.intersection(channels)):
-        means = across_wraps(channels[name]) & ~(crossing if name in ANGLES else False)
+    none = np.zeros(recording.time.size, dtype=bool)
+    return {
+        name: across_wraps(recording[name]) & ~(crossing if name in ANGLES else none)
+        for name in sorted(PERIODIC.intersection(recording.channels))
+    }
+
+
+def _without_means(recording: Recording) -> Recording:
+    """The recording with gaps for samples that are means over a wrap."""
+    channels, notes = dict(recording.channels), list(recording.notes)
+    for name, means in means_over_wraps(recording).items():
         if count := int(means.sum()):
             channels[name] = np.where(means, np.nan, channels[name])
             first = float(recording.time[np.argmax(means)])

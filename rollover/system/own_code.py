@@ -19,7 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from rollover.system.errors import Fault, InputError, excerpt
+from rollover.system.errors import Fault, InputError, cured, excerpt
 
 KINDS = {"effects": "ROLLOVER_EFFECTS", "laws": "ROLLOVER_LAWS", "models": "ROLLOVER_MODELS"}
 
@@ -66,11 +66,15 @@ def _load(kind: str, path: Path, examine: Callable[[ModuleType], str]) -> None:
         return
     if not path.is_file():
         raise InputError(Fault(file=str(path), message=f"no such file of {kind}; a Python file is needed"))
+    if path.suffix != ".py":
+        message = f"not a Python file of {kind}, got {path.name!r}; a name that ends in .py is needed"
+        raise InputError(Fault(file=str(path), message=message))
     try:
         module = importlib.import_module(name)
     except Exception as e:
         sys.modules.pop(name, None)
-        raise InputError(Fault(file=str(path), line=_line(e, path), message=_worded(e))) from e
+        fault = Fault(file=str(path), line=_line(e, path), message=_worded(e))
+        raise InputError(cured(fault, "a file that Python imports is needed")) from e
     if wrong := examine(module):
         del sys.modules[name]
         raise InputError(Fault(file=str(path), message=wrong))

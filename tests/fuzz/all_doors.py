@@ -7,7 +7,9 @@ import io
 import os
 from pathlib import Path
 
+from rollover.cli.commands.exporting import FORMATS
 from tests.fuzz import seeds
+from tests.fuzz.answers import answers, own_code, signals
 from tests.fuzz.doors import OUT, Door, Seed, documents, recordings
 from tests.fuzz.oracle import command
 from tests.fuzz.seeds import Files
@@ -29,6 +31,7 @@ def results(folder: Path) -> list[Door]:
             ["run", "drop_test", "--no-half-step", "--set", "initiation.speed=2.0", "--out", "two"],
             ["study", "study.yaml", "--workers", "0", "--out", "cases"],
             ["synthesize", "drop_test", "--out", "rec"],
+            ["compare", "drop_test", "rec", "--out", "compared"],
             ["regress", "drop_test", "--workers", "0", "--out", "account"],
         ):
             with (
@@ -75,6 +78,27 @@ def results(folder: Path) -> list[Door]:
             weight=0.5,
         ),
     ]
+    exported = [
+        Seed(
+            name=f"export {to}",
+            files=both,
+            words=["export", "one", "--to", to, *OUT],
+            touched=("one/channels.parquet", "one/channels.parquet", "one/run.json"),
+            options=(("--channel", "?ground/*"),),
+        )
+        for to in FORMATS
+    ]
+    compared = taken("compared")
+    exported.append(
+        Seed(
+            name="export comparison",
+            files=compared,
+            words=["export", "compared", *OUT],
+            touched=tuple(n for n in compared if n.endswith((".json", ".parquet"))),
+        )
+    )
+    plain = {"drop_1.csv": seeds.csv(seeds.drop_columns()), "drop_1.yaml": seeds.SIDE.encode()}
+    exported.append(Seed(name="export recording", files=plain, words=["export", "drop_1.csv", "--to", "xlsx", *OUT]))
     seen = taken("one", but=(".html",))
     view = [
         Seed(
@@ -125,6 +149,7 @@ def results(folder: Path) -> list[Door]:
     ]
     return [
         Door(name="results", seeds=runs, weight=1.5),
+        Door(name="export", seeds=exported, weight=0.8),
         Door(name="view", seeds=view, weight=0.02),
         Door(name="study results", seeds=study, weight=0.1),
         Door(name="diagnosis", seeds=diagnosis, weight=0.12),
@@ -166,6 +191,12 @@ def options() -> list[Door]:
         (["identify", "drop_1.csv", *OUT, "--buoyancy", "1"], (5,), 0.5),
         (["identify", "drop_1.csv", *OUT, "--scenario", "x"], (5,), 0.5),
         (["import", "drop_1.csv", *OUT, "--to", "csv"], (5,), 1.0),
+        (["export", "drop_1.csv", *OUT, "--to", "csv"], (5,), 0.5),
+        (["export", "drop_1.csv", *OUT, "--channel", "*"], (5,), 0.5),
+        (["export", "nothing", *OUT], (1,), 0.5),
+        (["diagnose", "drop_1.csv", "--model", "duffing", *OUT], (3,), 0.5),
+        (["--laws", "nothing.py", "check", "drop_test"], (1,), 0.3),
+        (["--effects", "nothing.py", "list", "effects"], (1,), 0.3),
         (["import", "drop_1.csv", *OUT, "--as", "csv"], (5,), 1.0),
         (["import", "drop_1.csv", *OUT, "--channel", "*"], (5,), 1.0),
         (["check", "drop_test"], (1,), 1.0),
@@ -191,4 +222,4 @@ def options() -> list[Door]:
 
 def doors(folder: Path) -> list[Door]:
     """All doors; results are made in `folder`."""
-    return [*documents(), *recordings(), *results(folder), *options()]
+    return [*documents(), *recordings(), *results(folder), *options(), signals(), own_code(), answers()]

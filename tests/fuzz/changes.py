@@ -14,6 +14,7 @@ from typing import Any
 # in the place of a value, as it is written in YAML; all of them harmless
 RAW = (
     *("null", "~", "true", "''", "x", "-1", "0", "1e400", "-1e400", ".nan", ".inf", "-.inf", "1e-320", "1_000", "0x1F"),
+    *("0x" + "f" * 5000, "0o" + "7" * 9000),
     *("0o17", "1:30", "2020-01-01", "9" * 400, "9" * 5000, "1." + "3" * 400, "'" + "n" * 300 + "'", "[]", "{}", "[1]"),
     *("[[1, 2], [3]]", "{kind: [a, b]}", "{kind: {}}", "[null]", "!!binary aGk=", "!thing 3", "!!set {a, b}", "*a"),
     *(
@@ -40,7 +41,24 @@ RAW = (
     *("{name: a}", "[{name: a}, {name: a}]", "'%s %n {0}'", "!!int x", "!!float 1e", "!!timestamp 5", "!!null x", "|-"),
 )
 WORDS = ("kind", "base", "title", "format", "name", "vehicle", "ground", "law", "channels", "unit", "é", "", "a.b", "*")
-NUMBERS = ("nan", "inf", "-inf", "", "x", "1e400", "9" * 400, "-", "1,5", "0x10", "1 2", "=1+1", '"', "NaN", "1e-400")
+NUMBERS = (
+    "0x" + "f" * 5000,
+    "nan",
+    "inf",
+    "-inf",
+    "",
+    "x",
+    "1e400",
+    "9" * 400,
+    "-",
+    "1,5",
+    "0x10",
+    "1 2",
+    "=1+1",
+    '"',
+    "NaN",
+    "1e-400",
+)
 ENCODINGS = ("utf-16", "utf-16-le", "utf-32", "cp1252", "utf-7", "utf-8-sig")
 _MARK = "@@{}@@"
 _TOKEN = re.compile(r'"@@(\d+)@@"')

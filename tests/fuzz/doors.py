@@ -213,6 +213,7 @@ def recordings() -> list[Door]:
         "netcdf": ("a.nc", seeds.netcdf),
         "mcap": ("a.mcap", seeds.mcap),
         "ide": ("a.ide", seeds.ide),
+        "xlsx": ("a.xlsx", seeds.xlsx),
     }
     columns = {
         "mat": "{t: {channel: time, unit: s}, F: {channel: ground/force_normal, unit: N}}",
@@ -223,6 +224,7 @@ def recordings() -> list[Door]:
         "ide": "{a/b: {channel: ground/force_normal, unit: N}}",
         "mdf": "{ground/force_normal: {channel: ground/force_normal}}",
         "tdms": "{ground/force_normal: {channel: ground/force_normal}}",
+        "xlsx": "{data/t: {channel: time}, data/F: {channel: ground/force_normal}}",
     }
     members = texts.mme_members()
     of_text: dict[str, list[Seed]] = {
@@ -262,7 +264,7 @@ def recordings() -> list[Door]:
                 ),
             ]
             doors.append(Door(name=f"importer {name}", seeds=found))
-        elif name in of_text:
+        elif name not in ("plain", "csv"):  # which the first two doors are
             doors.append(Door(name=f"importer {name}", seeds=of_text[name]))
     made: dict[str, Callable[..., Files]] = {
         "cube-tosses": sets.cube,
@@ -270,10 +272,10 @@ def recordings() -> list[Door]:
         "cone-drops": sets.cones,
         "falling-balls": sets.balls,
         "soil-penetrometer": sets.penetrometer,
-        "impact-entries": sets.cube,
+        "impack": lambda rng=None: {"2mps_sphere_1.ide": seeds.ide(rng)},
     }
     for name in COLLECTIONS:
-        make_set = made.get(name, lambda rng=None: {"2mps_sphere_1.ide": seeds.ide(rng)})
+        make_set = made[name]
         slow = name in ("soil-penetrometer",)
         doors.append(
             Door(

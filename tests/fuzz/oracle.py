@@ -23,6 +23,7 @@ from typing import Any
 import typer.main
 
 from rollover.cli.commands import common
+from rollover.system import own_code
 
 LONGEST = 5.0  # s of the processor, of one input
 MOST_MEMORY = 1 << 30  # bytes, beyond what the process held before
@@ -32,12 +33,16 @@ CLASSES = ("traceback", "hang", "memory", "outside", "unreadable", "line", "stat
 
 # a cure: what is allowed, needed, meant, or what to do instead, behind what is wrong
 _CURE = re.compile(r"; \S|\? |did you mean|\b(is|are) (needed|allowed)\b")
+_OWN_CODE = re.compile(r"\S+\.py(:\d+)?: ")  # what Python says of a user's own code is what helps there
 _PLACE = re.compile(r"\S.*?: \S")
 # how libraries and Python word things that nobody asked about
 _BARE = re.compile(
     r"\b[A-Z]\w+(Error|Exception|Warning)\b|NoneType|object has no attribute|Errno|<class |object at 0x|Traceback"
     r"|'utf-?8' codec|can't decode|invalid literal|could not convert|unpack requires|not subscriptable"
 )
+
+
+_OWN_MODULES = tuple(f"rollover_{kind}_" for kind in own_code.KINDS)
 
 
 class Hang(BaseException):
@@ -73,7 +78,7 @@ def is_whole(line: str) -> str:
         return "no place"
     if not _CURE.search(line):
         return "no cure"
-    if found := _BARE.search(line):
+    if (found := _BARE.search(line)) and not _OWN_CODE.match(line):
         return f"bare text {found[0]}"
     return ""
 
@@ -135,7 +140,7 @@ def judge(folder: Path, words: Sequence[str], out: str = "out", *, whole: bool =
 
     With `whole` results stood there before: a refusal leaves them.
     """
-    before = _files(folder, out)
+    before, environment = _files(folder, out), dict(os.environ)
     here = Path.cwd()
     os.chdir(folder)
     faults: list[str] = []
@@ -176,6 +181,7 @@ def judge(folder: Path, words: Sequence[str], out: str = "out", *, whole: bool =
         del common.print  # type: ignore[attr-defined]
         seconds = process_time() - began
         os.chdir(here)
+        _forget_own_code(environment)
     memory = max(0, _status("VmHWM") - held)
     said = stderr.getvalue()
     if memory > MOST_MEMORY:
@@ -185,7 +191,11 @@ def judge(folder: Path, words: Sequence[str], out: str = "out", *, whole: bool =
         finds.append(("status", f"{status}: {_shape(said.strip().splitlines()[-1:])}"))
     if status == 2:
         finds += _lines(faults, said)
-    finds += [("warning", f"{w.category.__name__} {Path(w.filename).name}:{w.lineno}") for w in warned]
+
+    def is_own(w: warnings.WarningMessage) -> bool:
+        return Path(w.filename).is_relative_to(folder)
+
+    finds += [("warning", f"{w.category.__name__} {Path(w.filename).name}:{w.lineno}") for w in warned if not is_own(w)]
     finds += [("line", f"said by a library: {_shape([text])}") for text in _beside if text.strip()]
     _beside.clear()
     changed = _changed(before, _files(folder, out))
@@ -197,6 +207,14 @@ def judge(folder: Path, words: Sequence[str], out: str = "out", *, whole: bool =
         finds.append(("outside", "exit status 2, and something was written"))
     shutil.rmtree(folder / out, ignore_errors=True)
     return Verdict(status=status, seconds=seconds, memory=memory, said=said, finds=tuple(dict.fromkeys(finds)))
+
+
+def _forget_own_code(environment: dict[str, str]) -> None:
+    """Files of one's own are those of a process: the next input is that of another."""
+    os.environ.clear()
+    os.environ.update(environment)
+    for name in [n for n in sys.modules if n.startswith(_OWN_MODULES)]:
+        del sys.modules[name]
 
 
 def _lines(faults: list[str], said: str) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import io
 import json
 import random
@@ -183,6 +184,23 @@ def hdf5(rng: random.Random | None = None) -> bytes:
         group["again"] = h5py.SoftLink("/t" if rng is None else rng.choice(("/t", "/run", "/run/again", "/nowhere")))
         group["records"] = np.array([(0.0, 1.0)] * 12, [("t", "f8"), ("F", "f4")])
     return stream.getvalue()
+
+
+def xlsx(rng: random.Random | None = None) -> bytes:
+    """A workbook of somebody else: names, units, rows, and a sheet of words."""
+    from tests.rollover.published_files import write_book
+
+    rows: list[list[Any]] = [["t", "F"], ["s", "N"], *([float(t), 100.0 * float(t)] for t in TIME)]
+    sheets: dict[str, list[list[Any]]] = {"data": rows, "notes": [["made up"]]}
+    if rng is not None:
+        row = rng.choice(rows)
+        dates = (datetime.datetime(2024, 5, 1), datetime.time(10, 0), datetime.timedelta(days=4000))
+        row[rng.randrange(2)] = rng.choice((None, "x", "", True, "=1+1", "=1/0", "#N/A", 10**300, *dates, *ODD[5:14]))
+        if rng.random() < 0.3:
+            sheets[rng.choice(("about", "channels", "data2", "é"))] = [["format: rollover-recording/1"], *rows[:3]]
+        if rng.random() < 0.2:
+            del rows[rng.randrange(len(rows)) :]
+    return made(lambda path: write_book(path, sheets), "a.xlsx")
 
 
 def netcdf(rng: random.Random | None = None) -> bytes:

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from rollover.recording.importers import COLLECTIONS, importers
+from tests.fuzz.all_doors import doors
 from tests.fuzz.campaign import campaign, report
-from tests.fuzz.oracle import is_whole, judge
+from tests.fuzz.oracle import command, is_whole, judge
 from tests.rollover.foreign import needs
 
 for library in ("nptdms", "asammdf", "h5py", "mcap", "idelib", "openpyxl"):
@@ -26,6 +28,17 @@ def test_two_thousand_inputs(tmp_path: Path) -> None:
     assert not done.kinds, report(done)
 
 
+def test_every_command_and_reader_has_a_door(tmp_path: Path) -> None:
+    """One that is added later is fuzzed from its first day on, or this says so."""
+    all_of_them = doors(tmp_path)
+    names = {d.name for d in all_of_them}
+    assert {f"importer {n}" for n in importers() if n not in ("plain", "csv")} <= names
+    assert {f"set {n}" for n in COLLECTIONS} <= names
+    words = {seed.words[0] for d in all_of_them for seed in d.seeds}
+    assert set(command().commands) <= words
+    assert {"--laws", "--effects"} <= words
+
+
 @pytest.mark.parametrize(
     ("line", "lacks"),
     [
@@ -34,6 +47,7 @@ def test_two_thousand_inputs(tmp_path: Path) -> None:
         ("a.csv: cannot be read", "no cure"),
         ("cannot be read", "no place"),
         ("a.h5: not readable: 'NoneType' object has no attribute 'x'; export it anew", "bare text"),
+        ("own.py:3: cannot be used: NameError: name 'x' is not defined; a file that Python imports is needed", ""),
         ("a.h5: not readable: [Errno 22] Invalid argument; export it anew", "bare text"),
     ],
 )

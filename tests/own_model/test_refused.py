@@ -233,6 +233,19 @@ def test_a_file_without_a_model_is_one_line(tmp_path: Path, text: str, wanted: s
         load_model(file)
     assert str(e.value).startswith(str(file))
     assert wanted in str(e.value)
+    assert all(has_cure(f.message) for f in e.value.faults), str(e.value)
+
+
+@pytest.mark.parametrize("name", ["r1.csv", "own.py.txt", "own"])
+def test_a_file_that_is_no_python_is_said_to_be_none(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("model = 3\n")
+    with pytest.raises(ro.InputError) as e:
+        load_model(tmp_path / name)
+    assert str(e.value) == (
+        f"{tmp_path / name}: not a Python file of models, got '{name}'; a name that ends in .py is needed"
+    )
+    assert all(has_cure(f.message) for f in e.value.faults), str(e.value)
+
     assert "\n" not in str(e.value)
 
 

@@ -17,6 +17,7 @@ from rollover.cli.main import app
 from rollover.recording import Recording
 from rollover.recording.importers import write_recording
 from rollover.spec import document
+from tests.fuzz import code
 from tests.ground.recorded_drops import recorded as recorded_drops
 from tests.rollover import studies
 
@@ -71,17 +72,46 @@ def commands(folder: Path) -> dict[str, tuple[list[object], Path]]:
         "stability": (["stability", "side_overturn", "--headings", "1", "--out", out / "a"], out / "a"),
         "view": (["view", folder / "given" / "a.rrd", "--html", shown], shown),
         "new": (["new", "recording", out / "mine"], out),
+        "plan": (
+            [
+                "plan",
+                "drop_test",
+                "--between",
+                "mass,soil-stiffness",
+                "--rate",
+                "200",
+                "--sensor",
+                "ground/sinkage",
+                "--out",
+                out / "a",
+            ],
+            out / "a",
+        ),
+        "rolling": (["rolling", "vineyard_tractor", "--out", out / "a"], out / "a"),
+        "export": (["export", recording, "--out", out / "e.csv"], out / "e.csv"),
+        "export xlsx": (["export", recording, "--to", "xlsx", "--out", out / "e.xlsx"], out / "e.xlsx"),
+        "export mat": (["export", recording, "--to", "mat", "--out", out / "e.mat"], out / "e.mat"),
+        "export mme": (["export", recording, "--to", "mme.zip", "--out", out], out),
+        "diagnose model": (["diagnose", "--model", *of_model(folder), "--workers", "0", "--out", out / "a"], out / "a"),
     }
 
 
 NAMES = ("run", "import", "import parquet", "import mme", "synthesize", "compare", "study")
 NAMES += ("diagnose", "calibrate", "identify", "prove", "regress", "stability", "view", "new")
+NAMES += ("plan", "rolling", "export", "export xlsx", "export mat", "export mme", "diagnose model")
 
 
 def as_it_is(folder: Path) -> None:
     """A recording of a scenario that lacks nothing, in `given`: a diagnosis of it is soon done."""
     words = ("synthesize", "drop_test", "--set", "initiation.speed=3", "--seed", "1", "--name", "as_is")
     assert rollover(*words, "--out", folder / "given").exit_code == 0
+
+
+def of_model(folder: Path) -> list[object]:
+    """A model of one's own and recordings of it."""
+    for name, data in code.model().items():
+        (folder / "given" / name).write_bytes(data)
+    return [folder / "given" / name for name in ("own.py", "r1.csv", "r2.csv")]
 
 
 def baseline_of(folder: Path) -> Path:

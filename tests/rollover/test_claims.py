@@ -107,6 +107,21 @@ def test_a_workbook_that_unpacks_to_much_is_refused(tmp_path: Path, cheap: None)
     assert "xl/sheet1.xml: claims too much, got 157 MB of contents" in line
 
 
+@pytest.mark.parametrize("sheets", [1, 3])
+def test_rows_of_a_workbook_claim_the_places_between_their_cells(sheets: int, tmp_path: Path) -> None:
+    """A row with a first and a last cell, 16384 columns apart: 40 bytes on disk, 131 kB of places."""
+    openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed: workbooks are not tested")
+    book = openpyxl.Workbook(write_only=True)
+    for k in range(sheets):
+        page = book.create_sheet(f"s{k}")
+        for _ in range(900 // sheets):
+            page.append([1.0, *[None] * 16382, 2.0])
+    book.save(tmp_path / "a.xlsx")
+    line = line_of(lambda: read_recording(tmp_path / "a.xlsx"))
+    assert f"sheet s{sheets // 2}: claims too much, got 64" in line
+    assert "ROLLOVER_BUDGET=2 in the environment allows it" in line
+
+
 # --- formats of instruments
 
 

@@ -10,6 +10,7 @@ import pytest
 from rollover.recording.importers import read_recording
 from rollover.scenario import load
 from rollover.system.errors import InputError
+from tests.fuzz.oracle import is_whole
 
 SECRET = "root:x:0:0:secret"
 PROFILE = """format: rollover-profile/1
@@ -118,3 +119,50 @@ def test_numbers_of_other_files_are_not_fetched(kind: str, words: str, tmp_path:
 def test_a_file_that_stands_alone_is_read(kind: str, tmp_path: Path) -> None:
     found = read_recording(hdf5(tmp_path, kind), profile=tmp_path / "p.yaml")
     assert found["ground/force_normal"][-1] == 9.0
+
+
+# ---- signals
+
+
+def driven(folder: Path, signal: str) -> str:
+    """What a scenario is refused with whose table follows that signal."""
+    base = "base: tilt_table_recorded\ninputs:\n  table:\n    angle_deg: "
+    (folder / "s.yaml").write_text(f"{base}{{{signal}, channel: input/table/angle, offset: 0.0}}\n")
+    with pytest.raises(InputError) as caught:
+        load(folder / "s.yaml")
+    assert "secret" not in str(caught.value)
+    assert is_whole(str(caught.value)) == ""
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["passwd", "key.pem", "environ", "own.py"])
+def test_a_signal_is_a_recording_and_no_other_file(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(SECRET)
+    (tmp_path / "p.yaml").write_text("format: rollover-profile/1\nchannels: {t: {channel: time, unit: s}}\n")
+    place = f"{tmp_path / 's.yaml'}:4: inputs.table.angle_deg.file: not the name of a recording, got '{name}'"
+    assert driven(tmp_path, f"file: {name}, profile: p.yaml").startswith(place)
+    (tmp_path / "r.csv").write_text("t,F\n0,1\n1,2\n")
+    said = driven(tmp_path, f"file: r.csv, profile: {tmp_path / name}")
+    assert "inputs.table.angle_deg.profile: not the name of a profile" in said
+    assert said.endswith("one that ends in .yaml, .yml is needed")
+
+
+@pytest.mark.parametrize("content", [SECRET, f"- {SECRET}\n", f'"{SECRET}"', "\x00" + SECRET])
+def test_of_a_profile_that_is_none_nothing_is_told(content: str, tmp_path: Path) -> None:
+    (tmp_path / "passwd").write_text(content)
+    (tmp_path / "p.yaml").symlink_to("passwd")
+    (tmp_path / "r.csv").write_text("t,F\n0,1\n1,2\n")
+    driven(tmp_path, "file: r.csv, profile: p.yaml")
+
+
+@pytest.mark.parametrize(
+    "line", ["base: {0}.yaml", "base: drop_test\nvehicle: {0}.yaml", "base: drop_test\nvehicle: {0}"]
+)
+def test_a_name_that_no_file_can_have_is_none(line: str, tmp_path: Path) -> None:
+    for name in ("n" * 5000, "a/" * 3000 + "b"):
+        (tmp_path / "s.yaml").write_text(line.replace("{0}", name) + "\n")
+        with pytest.raises(InputError) as caught:
+            load(tmp_path / "s.yaml")
+        assert str(caught.value).startswith(f"{tmp_path / 's.yaml'}:{line.count(chr(10)) + 1}: ")
+    said = driven(tmp_path, f"file: {'n' * 5000}.csv")
+    assert said.startswith(f"{tmp_path / 's.yaml'}:4: inputs.table.angle_deg.file: no such file")

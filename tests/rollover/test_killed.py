@@ -29,10 +29,10 @@ from tests.rollover.machines import (
 
 
 @posix
-@pytest.mark.parametrize("name", ["run", "compare", "study", "synthesize"])
+@pytest.mark.parametrize("name", ["run", "compare", "study", "synthesize", "plan", "rolling", "export"])
 def test_a_second_start_is_told_of_the_first(name: str, tmp_path: Path) -> None:
     words, _ = commands(tmp_path)[name]
-    target = tmp_path / "out" / ("d.csv" if name == "synthesize" else "a")
+    target = tmp_path / "out" / {"synthesize": "d.csv", "export": "e.csv"}.get(name, "a")
     if name == "study":
         from rollover.studies import case_store
 

@@ -30,7 +30,8 @@ from tests.rollover.machines import (
 )
 from viz.pages.web_page import Viewer
 
-QUICK = ("import", "import parquet", "import mme", "synthesize", "view", "new")
+QUICK = ("import", "import parquet", "import mme", "synthesize", "view", "new", "rolling")
+QUICK += ("export", "export xlsx", "export mat", "export mme")
 PROGRESS = (
     "ompil",
     "cases",
@@ -43,10 +44,15 @@ PROGRESS = (
     "fits of",
     "fitted",
     "depends",
+    "effects in",
+    "pairs",
+    "apart",
 )
 WORK = (
     "rollover.diagnosis.sensors_first.diagnosed",
     "rollover.diagnosis.overlay.series",
+    "rollover.diagnosis.planning.plan.plan",
+    "rollover.diagnosis.own_model.diagnose_model",
     "rollover.calibration.request.calibrate",
     "rollover.calibration.identification.identified",
     "rollover.proof.runner.prove",
@@ -141,7 +147,7 @@ def test_the_earlier_results_stay_where_the_disk_is_full(tmp_path: Path, monkeyp
         assert tree(tmp_path / "out") == before
 
 
-@pytest.mark.parametrize("command", ["run", "synthesize", "study", "import"])
+@pytest.mark.parametrize("command", ["run", "synthesize", "study", "import", "plan", "export", "diagnose model"])
 def test_what_cannot_be_written_is_said_before_the_work(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -151,9 +157,12 @@ def test_what_cannot_be_written_is_said_before_the_work(
     disk.full(1)
     monkeypatch.setattr("rollover.dynamics.simulate.run", lambda *a, **k: pytest.fail("it was simulated first"))
     monkeypatch.setattr("rollover.studies.runner.conduct", lambda *a, **k: pytest.fail("it was worked out first"))
+    for work in WORK:
+        monkeypatch.setattr(work, lambda *a, **k: pytest.fail("it was worked out first"))
     result = rollover(*words)
     assert result.exit_code == WRONG
-    assert len(result.stderr.splitlines()) == 1
+    lines = [line for line in result.stderr.splitlines() if "ompil" not in line]  # said once per installation
+    assert len(lines) == 1
     assert "out" in result.stderr
     assert "ead-only file system" in result.stderr
 

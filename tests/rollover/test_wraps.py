@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from rollover.recording import Recording
-from rollover.recording.attitude import continuous
+from rollover.recording.attitude import ANGLES, continuous, means_over_wraps
 from rollover.recording.checks import prechecks
-from rollover.spec.frames import across_wraps
+from rollover.spec.frames import across_wraps, other_branch
 
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
@@ -95,3 +95,43 @@ def test_check_calls_them_what_they_are() -> None:
     found = prechecks(of(recorded))
     assert [f.check for f in found if f.channel == "chassis/roll"] == ["wrap-around"] * len(found)
     assert any("averaged over a wrap-around" in f.sentence for f in found)
+
+
+def turning(which: int, at: tuple[float, float, float], rows: slice) -> Recording:
+    """Roll, pitch, yaw of which one turns slowly over +180 degrees, some rows given by the other branch."""
+    rpy = np.tile(np.array(at), (400, 1))
+    rpy[:, which] = math.pi - 0.4 + 0.002 * np.arange(400)
+    rpy += np.random.default_rng(2).normal(0.0, 1e-4, rpy.shape)
+    rpy[rows] = other_branch(rpy[rows])
+    channels = {name: wrapped(rpy[:, k], -math.pi) for k, name in enumerate(ANGLES)}
+    return Recording(title="", time=np.arange(400) / 50.0, channels=channels)
+
+
+@pytest.mark.parametrize(("which", "at"), [(0, (0.0, 1.3, 0.2)), (2, (-0.4, 1.2, 0.0))])
+def test_a_sample_on_the_other_branch_is_a_mean_in_no_command(which: int, at: tuple[float, float, float]) -> None:
+    recorded = turning(which, at, slice(200, 201))
+    name = ANGLES[which]
+    assert across_wraps(recorded[name])[200]  # by this angle alone it would be one
+    assert not means_over_wraps(recorded)[name].any()
+    assert np.isfinite(continuous(recorded)[name]).all()
+    assert not any("averaged" in f.sentence for f in prechecks(recorded))
+
+
+@pytest.mark.parametrize("which", [0, 2])
+def test_only_whole_turns_are_told_as_wraps(which: int) -> None:
+    """Every other of the first 150 rows by the other branch, half a turn away; one wrap, later."""
+    recorded = turning(which, (0.1, 1.3, 0.2), slice(0, 150, 2))
+    steps = np.abs(np.diff(recorded[ANGLES[which]]))
+    assert (steps > math.pi).sum() > 20
+    told = {f.channel: f.value for f in prechecks(recorded) if f.check == "wrap-around"}
+    assert told == {ANGLES[which]: 1.0}
+
+
+def test_an_angle_that_turns_no_whole_turns_has_no_means_over_wraps() -> None:
+    """A prescribed steering angle is read as it is: nothing of it becomes a gap, and none is told."""
+    noise = np.random.default_rng(1).normal(0.0, 1e-3, 1200)
+    values = means(wrapped(2.5041 + SLOW * np.arange(1200) / 100.0 + noise, -math.pi), 2)
+    recorded = of(values, "input/steering/angle")
+    assert across_wraps(values).sum() == 1
+    assert not any("averaged" in f.sentence for f in prechecks(recorded))
+    assert np.array_equal(continuous(recorded)["input/steering/angle"], values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,10 @@ from ruamel.yaml import YAML
 
 from rollover.scenario import load
 from rollover.spec import document
+from rollover.spec.document.tree import Place
+from rollover.system.errors import InputError
 
+PLACE = Place(file="a.yaml", line=1, folder=Path())
 FLOATS = (1e-05, 1.0, -1e22, 1.5e-7, 0.1 + 0.2, 1e16, 123456789.0, 5e-324, float(np.nextafter(1.0, 2.0)), -0.0)
 TEXTS = (
     "on",
@@ -53,3 +57,23 @@ def test_every_shipped_scenario_says_the_same_to_both() -> None:
     for name in ("side_overturn", "drop_test", "field_upset_side", "static_rops_test"):
         text = document.dump(load(name))
         assert read(text, "1.1") == read(text, "1.2"), name
+
+
+@pytest.mark.parametrize("number", ["0x" + "f" * 5000, "-0x" + "1" * 4000, "0o" + "7" * 9000, "9" * 5000])
+def test_a_whole_number_too_long_to_be_written_is_text(number: str) -> None:
+    """Python reads one of base 16 of any length and refuses to write it: no message could say what was got."""
+    assert document.parse(f"a: {number}\n", PLACE).plain == {"a": number}
+
+
+@pytest.mark.parametrize("number", ["0x1F", "0x" + "f" * 300, "0o17", "9" * 400])
+def test_other_whole_numbers_are_numbers(number: str) -> None:
+    assert document.parse(f"a: {number}\n", PLACE).plain == {"a": int(number, 0)}
+
+
+@pytest.mark.parametrize("number", ["0x" + "f" * 5000, "0o" + "7" * 9000])
+def test_a_number_of_any_base_is_one_line(number: str, tmp_path: Path) -> None:
+    (tmp_path / "s.yaml").write_text(f"base: drop_test\nvehicle: {{mass: {number}}}\n")
+    with pytest.raises(InputError) as caught:
+        load(tmp_path / "s.yaml")
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith(f"{tmp_path / 's.yaml'}:2: vehicle.mass: not a number, got text '0")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import json
+import pkgutil
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -22,11 +24,12 @@ from rollover.recording.time_stamps import Zero
 from rollover.studies.baseline import Answer
 from tests.rollover.diagnosed import overlays, sensor_at_fault
 from tests.rollover.studies import made_up
-from tests.viz import example
+from tests.viz import example, spoilt
 from tests.viz.browser import CHROMIUM, has_browser
 from tests.viz.html import Parts
 from tests.viz.test_proof_page import row
 from tests.viz.test_study_page import account as made_account
+from viz import pages
 from viz.content.blocks import Cases, Details, Figure, Footer, Headline, Note, Pairs, Section, Table
 from viz.content.embedded import embedded, in_script, policy
 from viz.figures.plots import Curve, history
@@ -51,6 +54,7 @@ MARKS = (
 )
 HOSTILE = " ".join(MARKS)
 KINDS = ("run", "compare", "two runs", "diagnose", "prove", "regress", "study", "calibrate", "every block", "viewer")
+KINDS += ("plan", "rolling", "stability")
 ABOUT: dict[str, Any] = {"scenario_hash": HOSTILE, "versions": {HOSTILE: HOSTILE}}
 
 
@@ -119,6 +123,8 @@ def page_of(kind: str, folder: Path) -> str:
         study, done = made_up(folder, 120)
         study = replace(study, title=HOSTILE)
         return study_page.page(study, done, made_account(study, done), command=HOSTILE)
+    if kind in ("plan", "rolling", "stability"):
+        return spoilt.PAGES[kind](HOSTILE)
     if kind == "calibrate":
         return calibration.page(calibrated(), command=HOSTILE, **ABOUT)
     if kind == "viewer":
@@ -138,6 +144,18 @@ def page_of(kind: str, folder: Path) -> str:
     headline = Headline(sentence=HOSTILE, detail=HOSTILE)
     footer = Footer(command=HOSTILE, **ABOUT, hash_of=HOSTILE)
     return render(title=HOSTILE, subtitle=HOSTILE, headline=headline, blocks=inside, footer=footer)
+
+
+def test_no_kind_of_page_is_left_out() -> None:
+    """Whatever writes a page is among `KINDS`: one that is added later is tried too."""
+    by_kind = {"run": "report", "compare": "comparison", "two runs": "pair", "diagnose": "diagnosis", "prove": "proof"}
+    by_kind |= {"regress": "regression", "calibrate": "calibration", "viewer": "web_page", "every block": "page"}
+    write = {m.name for m in pkgutil.iter_modules(pages.__path__) if _writes_a_page(m.name)}
+    assert write == {by_kind.get(kind, kind) for kind in KINDS} - {"page"}
+
+
+def _writes_a_page(name: str) -> bool:
+    return callable(getattr(importlib.import_module(f"viz.pages.{name}"), "page", None))
 
 
 @pytest.mark.skipif(not has_browser(), reason="no chromium with playwright")

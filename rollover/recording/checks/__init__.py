@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from rollover.recording import Recording
-from rollover.recording.attitude import continuous
+from rollover.recording.attitude import continuous, means_over_wraps, on_other_branch
 from rollover.recording.checks.angles import is_of_means, wraps
 from rollover.recording.checks.finding import Finding, Trace, instant, trace, when
 from rollover.recording.checks.kinematic import disagreements
@@ -49,17 +51,22 @@ def prechecks(
     found = [*free_fall(traces, gravity), *rest(traces, mass, gravity), *disagreements(traces, seed=seed)]
     found += zero_offsets(traces, mass, gravity, {f.channel for f in found if f.check == "free-fall"})
     is_vehicle = any(name.startswith(VEHICLE) for name in traces)
+    over, turned = means_over_wraps(recording), on_other_branch(recording)
+    none = np.zeros(recording.time.size, dtype=bool)
     for name, t in traces.items():
         unit = describe(name).unit
+        read = as_read.get(name, t)
+        at = np.searchsorted(recording.time, read.time)  # rows of its samples, without its gaps
+        means = over.get(name, none)[at]
         flat = list(clipping(t, unit))
         found += [
-            *(wraps(as_read[name]) if name in as_read else ()),
+            *(wraps(read, means, turned[at]) if name in as_read else ()),
             *flat,
             *rails(t, unit, {f.value for f in flat}),
             *polarity(t, unit),
             *lost(t, unit),
             *stuck(t, unit),
-            *(g for g in gaps(t) if name not in as_read or not is_of_means(g, as_read[name])),
+            *(g for g in gaps(t) if not is_of_means(g, read, means)),
             *spikes(t, unit, among_contacts=is_vehicle and not name.endswith(MOVING)),
             *leaps(t, unit, recording.cfc.get(name)),
         ]

@@ -12,23 +12,27 @@ from numpy.typing import NDArray
 from rollover.recording.checks.finding import Finding, Trace
 from rollover.recording.noise_floor import noise_floor
 from rollover.spec.channels import describe
-from rollover.spec.frames import across_wraps
+
+Mask = NDArray[np.bool_]
 
 CLOSE = 8.0  # noise levels, by which a step may miss a whole turn
 TURN = 2.0 * math.pi
 QUICK = 0.5  # rad a sample: a step that misses a turn by more is no wrap
 
 
-def wraps(t: Trace) -> Iterator[Finding]:
-    """Whole turns in a trace as it was read, not unwrapped, and means over them."""
+def wraps(t: Trace, means: Mask, turned: Mask) -> Iterator[Finding]:
+    """Whole turns in a trace as it was read, not unwrapped, and means over them.
+
+    `means` and `turned` (n,): which samples are means over a wrap, and on the other branch of roll, pitch, yaw.
+    """
     if describe(t.channel).unit != "rad" or float(np.ptp(t.values)) > TURN * 1.001:
         return
-    means = across_wraps(t.values)
     if means.any():
         yield _averaged(t, means)
-        t = replace(t, time=t.time[~means], values=t.values[~means])
+        t, turned = replace(t, time=t.time[~means], values=t.values[~means]), turned[~means]
     steps = np.diff(t.values)
-    over = np.flatnonzero(np.abs(steps) > 0.5 * TURN)
+    # to the other branch roll and yaw step by half a turn, give or take what they moved meanwhile
+    over = np.flatnonzero((np.abs(steps) > 0.5 * TURN) & (turned[1:] == turned[:-1]))
     if not over.size:
         return
     whole = np.unwrap(t.values)
@@ -53,15 +57,13 @@ def wraps(t: Trace) -> Iterator[Finding]:
     )
 
 
-def is_of_means(gap: Finding, t: Trace) -> bool:
-    """Whether a gap is one that samples averaged over a wrap of a trace, as it was read, have become."""
-    if describe(t.channel).unit != "rad":
-        return False
-    at = t.time[across_wraps(t.values)]
+def is_of_means(gap: Finding, t: Trace, means: Mask) -> bool:
+    """Whether a gap is one that means over a wrap, of a trace as it was read, have become."""
+    at = t.time[means]
     return bool(np.any((gap.start <= at) & (at <= gap.end)))
 
 
-def _averaged(t: Trace, means: NDArray[np.bool_]) -> Finding:
+def _averaged(t: Trace, means: Mask) -> Finding:
     count, at = int(means.sum()), np.flatnonzero(means)
     return Finding(
         check="wrap-around",

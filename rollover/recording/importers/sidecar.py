@@ -226,7 +226,7 @@ def _check_text(path: Path, size: int, data: bytes) -> None:
 
 def _described(path: Path, root: Node, kind: type[Sidecar] | type[Profile]) -> Described:
     if not isinstance(root.value, Mapping):
-        raise root.place.fault("", f"not a mapping, got {str(root.plain)[:40]!r}; format, channels are needed")
+        raise root.place.fault("", f"not a mapping, got {root.in_short}; format, channels are needed")
     faults: list[Fault] = []
     about = _checked(root, kind, "", faults)
     for path_, child in _conditions(root):

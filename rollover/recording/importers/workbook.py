@@ -13,6 +13,7 @@ from rollover.system.budget import Budget
 from rollover.system.errors import Fault, InputError
 
 IN_CELLS = 5  # bytes in memory of a byte of XML: a cell has some 30 there and 150 as an object
+PLACE = 8  # bytes of a place in a row, whether or not a cell fills it
 MOST_ROWS = 1_048_576  # of a sheet, in the file format itself
 MOST_EMPTY = 100  # rows without a value, after which a sheet is over; programs write 65536 of them
 
@@ -65,13 +66,14 @@ def _rows(path: Path) -> dict[str, list[Row]]:
                 claimed.claim(IN_CELLS * info.file_size, info.filename)
         file.seek(0)
         book = openpyxl.load_workbook(file, read_only=True, data_only=True)
-        return {sheet.title: list(_filled(sheet.iter_rows(values_only=True))) for sheet in book.worksheets}
+        return {sheet.title: list(_filled(sheet, claimed)) for sheet in book.worksheets}
 
 
-def _filled(rows: Iterator[Row]) -> Iterator[Row]:
-    """Rows with a value in them."""
+def _filled(sheet: Any, claimed: Budget) -> Iterator[Row]:
+    """Rows with a value in them; a row is as wide as its last cell says, however few it has. Raises `InputError`."""
     empty = 0
-    for row in rows:
+    for row in sheet.iter_rows(values_only=True):
+        claimed.claim(PLACE * len(row), f"sheet {sheet.title}")
         if all(value is None for value in row):
             empty += 1
             if empty > MOST_EMPTY:

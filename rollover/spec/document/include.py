@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -157,7 +157,15 @@ def _name(element: Node) -> str | None:
 
 def beside(name: str, node: Node) -> Path | None:
     """The file that a node names: beside the one in which it stands, or a shipped one; None where there is none."""
-    return next((f / name for f in (node.place.folder, shipped_folder()) if (f / name).is_file()), None)
+    return next((f / name for f in (node.place.folder, shipped_folder()) if _is_file(f / name)), None)
+
+
+def _is_file(path: Path) -> bool:
+    """Whether a path leads to a file; a name that no file can have, or a folder that is closed, leads nowhere."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def _grid(node: Node, path: str) -> Node:
@@ -177,7 +185,7 @@ def _file(node: Node) -> Path | None:
             return None
         name = Path(f"{name}.yaml")
         folders = (node.place.folder, *(shipped_folder() / shelf for shelf in SHELVES))
-    return next((f / name for f in folders if (f / name).is_file()), None)
+    return next((f / name for f in folders if _is_file(f / name)), None)
 
 
 def _means_file(node: Node) -> bool:
@@ -193,7 +201,9 @@ def _included(node: Node, slot: Slot, chain: tuple[Path, ...], path: str) -> Nod
     folders = (node.place.folder, shipped_folder())
     file = _file(node)
     if file is None:
-        known = {(name.parent / p.name).as_posix() for f in folders for p in (f / name).parent.glob("*.yaml")}
+        known: set[str] = set()
+        with suppress(OSError):  # of a folder that no name can be of
+            known |= {(name.parent / p.name).as_posix() for f in folders for p in (f / name).parent.glob("*.yaml")}
         known |= {p.relative_to(folders[1]).as_posix() for p in folders[1].glob("*/*.yaml")}
         if not name.name.endswith(ENDINGS):
             known = {p.stem for shelf in SHELVES for p in (folders[1] / shelf).glob("*.yaml")}
@@ -205,9 +215,7 @@ def _included(node: Node, slot: Slot, chain: tuple[Path, ...], path: str) -> Nod
         raise node.place.fault(path, f"a file includes itself, got {' -> '.join(names)}; no circles")
     root = read(file)
     if not isinstance(root.value, Mapping):
-        # a file that somebody else's scenario names may be anything: what it is, not what stands in it
-        what = "a list" if isinstance(root.value, tuple) else "a single value"
-        raise root.place.fault("", f"not a mapping, got {what}; {slot.allowed()} is needed")
+        raise root.place.fault("", f"not a mapping, got {root.in_short}; {slot.allowed()} is needed")
     return expand(root, slot, (*chain, file.resolve()), path)
 
 

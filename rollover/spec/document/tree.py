@@ -59,6 +59,12 @@ class Node:
         return self.value
 
     @property
+    def in_short(self) -> str:
+        """What it is, and nothing of what stands in it: a file that somebody else names may be anything."""
+        kinds = {Mapping: "a mapping", tuple: "a list"}
+        return next((said for kind, said in kinds.items() if isinstance(self.value, kind)), "a single value")
+
+    @property
     def kind(self) -> Scalar:
         """The scalar under the key `kind`, if there is one."""
         child = self.value.get("kind") if isinstance(self.value, Mapping) else None
@@ -181,6 +187,8 @@ class _Builder:
         if name in ("int", "float", "bool", "null"):
             try:
                 value: Scalar = self.scalars.construct_object(node, deep=True)
+                if isinstance(value, int):
+                    str(value)  # a base of 16 has no most digits when it is read, but none of it can be written
             except ValueError:
                 return str(node.value)
             return value

@@ -1,0 +1,78 @@
+"""Pages of plans, rolling and stability in which one text stands wherever a word from data may."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rollover.assessment.rolled import account, rolled
+from rollover.assessment.standing import scenario_of
+from rollover.diagnosis.planning.next_test import Advice, NextTest
+from rollover.diagnosis.planning.plan import Detectable, Pair, Plan
+from viz.pages import plan as plan_page
+from viz.pages import rolling as rolling_page
+from viz.pages import stability as stability_page
+
+OWN = ("verdict", "symbol")  # of an account: words of the program alone, by which a page decides
+
+
+def everywhere(value: Any, text: str) -> Any:
+    """An account with the text in place of each of its words, but for those of `OWN`."""
+    if isinstance(value, str):
+        return text
+    if isinstance(value, dict):
+        return {k: v if k in OWN else everywhere(v, text) for k, v in value.items()}
+    return [everywhere(v, text) for v in value] if isinstance(value, (list, tuple)) else value
+
+
+def _plan(text: str) -> str:
+    words: dict[str, Any] = {"kind": text, "parameter": text, "unit": text, "others": {text: 1.0}}
+    numbers: dict[str, Any] = {"least": 1.0, "usual": 2.0, "power": 0.9, "judged": 2.0}
+    effects = tuple(Detectable(effect=f"{text}{k}", **words, **numbers) for k in range(2))
+    names = [e.effect for e in effects]
+    pairs = tuple(Pair(effect=a, rival=b, noncentrality=1.0, probability=0.6) for a, b in (names, reversed(names)))
+    tried = NextTest(path=text, value=1.0, unit=text, channels=(text,), rate=100.0, probability=0.9)
+    advice = Advice(
+        effects=(names[0], names[1]), probability=0.6, best=tried, is_enough=False, tried=(tried,), known=text
+    )
+    shares = {"tolerance": 0.0, "gain": 0.01, "power": 0.8, "false_alarm": 0.05, "size": 0.01, "told_apart": 0.9}
+    found = Plan(
+        conditions=({text: text},),
+        noise={"ground/force_normal": 1.0},
+        rate=1000.0,
+        noncentrality=10.0,
+        effects=effects,
+        pairs=pairs,
+        next_tests=(advice,),
+        **shares,
+    )
+    return plan_page.page(found, title=text, command=text, scenario_hash=text, versions={text: text})
+
+
+def _rolling(text: str) -> str:
+    asked, found = rolled(scenario_of("vineyard_tractor"))
+    answer = everywhere(account(asked, found, {"scenario_hash": text, "outside": [text]}), text)
+    return rolling_page.page({**answer, "outside": [text], "versions": {text: text}}, command=text)
+
+
+def _stability(text: str) -> str:
+    closed = {"free_pivot_deg": None, "rigid_deg": 30.0}
+    row = {
+        **dict.fromkeys(("lift_off_deg", "phase_one_deg", "stop_deg", "overturn_deg", "balance_deg"), 30.0),
+        "first_off": [text],
+        "closed_form": {"outer_edge": closed, "centre_line": closed},
+    }
+    answer = {
+        "headings": [{**row, "heading_deg": h} for h in (0.0, 90.0, 180.0, 270.0)],
+        "least": {"balance_deg": 30.0, "heading_deg": 90.0},
+        "code_6": {"limit_deg": 38.0, "confidence": text},
+        "losses": [{"part": text, "mass": 1.0, "without_deg": 31.0, "with_deg": 30.0, "share": 0.03}],
+        "effects_left_out": [text],
+        "vehicle": text,
+        "scenario_hash": text,
+        "versions": {text: text},
+    }
+    return stability_page.page(answer, command=text)
+
+
+PAGES: dict[str, Callable[[str], str]] = {"plan": _plan, "rolling": _rolling, "stability": _stability}
