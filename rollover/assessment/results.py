@@ -86,8 +86,8 @@ def claim(
     is_own = made_from is not None and found.get("origin") == made_from
     if found.get("scenario_hash") != scenario_hash:
         if not is_own:
-            title = found.get("title", "")
-            raise _refused(folder, f"holds another run, got {title!r}; --force replaces it, --out leaves it")
+            got = f"{found.get('title', '')!r}{_as_set(found.get('origin'))}"
+            raise _refused(folder, f"holds another run, got {got}; --force replaces it, --out leaves it")
         _say_replaced(say, folder, "run", found)
     elif found.get("versions") != versions() or _is_by_other_code(found):
         if not is_own:
@@ -101,6 +101,12 @@ def _is_by_other_code(found: Mapping[str, Any]) -> bool:
     """Whether files of one's own effects or laws that a result was made with say something else now."""
     stated = found.get("own_code", {})
     return isinstance(stated, Mapping) and any(own_code.hashes(k) != stated[k] for k in own_code.KINDS if k in stated)
+
+
+def _as_set(made_from: object) -> str:
+    """What a result's scenario was set to besides its file: two variants of one scenario share their title."""
+    given = made_from.get("set") if isinstance(made_from, Mapping) else None
+    return f" with --set {' '.join(map(str, given))}" if isinstance(given, Sequence) and given else ""
 
 
 def _say_replaced(say: Callable[[str], None] | None, folder: Path, what: str, found: Mapping[str, Any]) -> None:

@@ -329,6 +329,36 @@ def test_base_and_parts_go_by_the_names_that_list_shows() -> None:
         load("a.yaml")
 
 
+@pytest.mark.parametrize("what", ["scenario", "study", "vehicle", "soil"])
+def test_base_finds_every_name_that_list_shows(what: str) -> None:
+    names = [row["name"] for row in catalogue.TABLES[what.replace("y", "ie") + "s"]()]
+    assert len(names) >= 4
+    for name in names:
+        Path("own.yaml").write_text(f"base: {name}\n")
+        assert catalogue.check("own.yaml") == what, name
+
+
+def test_a_frame_goes_by_its_name_too() -> None:
+    Path("own.yaml").write_text("base: compact_tractor\nrops: two_post_rear_3t\n")
+    assert document.load("own.yaml", AnyVehicle).rops == load("side_overturn").vehicle.rops
+
+
+@pytest.mark.parametrize(
+    ("base", "cure"),
+    [
+        ("utility_tracto", "did you mean 'utility_tractor'?"),
+        ("slope_side_overtur", "did you mean 'slope_side_overturn'?"),
+        ("../elsewhere/zzzz.yaml", "a file beside this one or a name that `rollover list` shows is needed"),
+    ],
+)
+def test_a_base_that_is_not_there_is_the_fault_not_the_kind(base: str, cure: str) -> None:
+    """A file that says nothing but its base is not asked what it is: the base would have told."""
+    Path("own.yaml").write_text(f"# mine\nbase: {base}\nmass: 3000\n")
+    with pytest.raises(InputError) as e:
+        catalogue.check("own.yaml")
+    assert str(e.value) == f"own.yaml:2: base: no such file, got '{base}'; {cure}"
+
+
 def test_a_star_stands_for_every_element_of_a_list() -> None:
     shipped = load("side_overturn")
     names = [wheel.name for wheel in shipped.vehicle.wheels]

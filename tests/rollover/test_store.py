@@ -228,6 +228,25 @@ def test_an_own_older_result_is_replaced_with_a_note(tmp_path: Path, monkeypatch
     assert "holds another run, got 'Mine'" in refused.stderr
 
 
+def test_a_variant_in_the_way_is_told_by_what_was_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two variants of a scenario share their title, so the title alone would not say what stands there."""
+    monkeypatch.chdir(tmp_path)
+
+    def asked(speed: str) -> Any:
+        given = ["--set", f"initiation.speed={speed}", "--set", "simulation.duration=0.05"]
+        return CliRunner().invoke(app, ["run", "drop_test", "--no-half-step", *given])
+
+    assert asked("2.0").exit_code == 0
+    assert asked("2.0").exit_code == 0
+    refused = asked("2.5")
+    assert refused.exit_code == 2
+    title = load("drop_test").title
+    assert refused.stderr.splitlines()[-1].endswith(
+        f"holds another run, got {title!r} with --set initiation.speed=2.0 simulation.duration=0.05; "
+        "--force replaces it, --out leaves it"
+    )
+
+
 def test_results_of_an_edited_scenario_are_ones_own(tmp_path: Path) -> None:
     folder = tmp_path / "out"
     said: list[str] = []

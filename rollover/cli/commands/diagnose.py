@@ -15,12 +15,8 @@ from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from rollover.diagnosis import Diagnosis
-<<<<<<< HEAD
     from rollover.diagnosis.overlay import Overlay
-=======
-    from rollover.diagnosis.overlay import Told
     from rollover.diagnosis.result import Estimate
->>>>>>> real
     from rollover.recording import Recording
 
 MOST_TOLERATED = 0.5  # of a range: what may miss half of it is no model of it

@@ -15,7 +15,8 @@ from rollover.system.errors import Fault, InputError, hint, nearest
 BASE = "base"
 ENDINGS = (".yaml", ".yml")
 GRIDS = (".csv", ".npy")
-SHELVES = ("", "vehicles", "soils", "steels")  # of shipped files, whose names without an ending may be used anywhere
+# of shipped files, whose names without an ending may be used anywhere
+SHELVES = ("", "vehicles", "vehicles/rops", "soils", "steels", "studies")
 
 
 def shipped_folder() -> Path:
@@ -44,7 +45,10 @@ def find(name: str | Path, folder: str = "") -> Path:
 
 
 def headings(path: Path) -> dict[str, Node]:
-    """Top-level keys of a file and of those that it is based on, to see what it describes. Raises `InputError`."""
+    """Top-level keys of a file and of those that it is based on, to see what it describes.
+
+    Raises `InputError`, for a base that is not there too: without it nobody knows what the file is.
+    """
     found: dict[str, Node] = {}
     chain: list[Path] = []
     while path.resolve() not in chain:
@@ -55,7 +59,10 @@ def headings(path: Path) -> dict[str, Node]:
         base = below.get(BASE)
         if base is None or not isinstance(base.value, str):
             break
-        path = _file(base) or path
+        file = _file(base)
+        if file is None:
+            raise _missing(base, BASE)
+        path = file
     return found
 
 
@@ -196,20 +203,26 @@ def _means_file(node: Node) -> bool:
     return bool(nearest(said, [p.stem for shelf in SHELVES for p in (shipped_folder() / shelf).glob("*.yaml")]))
 
 
-def _included(node: Node, slot: Slot, chain: tuple[Path, ...], path: str) -> Node:
+def _missing(node: Node, path: str) -> InputError:
+    """The fault of a name that means no file, with the nearest that does."""
     name = Path(str(node.value))
     folders = (node.place.folder, shipped_folder())
+    known: set[str] = set()
+    with suppress(OSError):  # of a folder that no name can be of
+        known |= {(name.parent / p.name).as_posix() for f in folders for p in (f / name).parent.glob("*.yaml")}
+    known |= {p.relative_to(folders[1]).as_posix() for p in folders[1].glob("*/*.yaml")}
+    if not name.name.endswith(ENDINGS):
+        known = {p.stem for shelf in SHELVES for p in (folders[1] / shelf).glob("*.yaml")}
+    close = nearest(name.as_posix(), sorted(known))
+    there = "a file beside this one or a name that `rollover list` shows is needed"
+    cure = f"did you mean {close[0]!r}?" if close else there
+    return node.place.fault(path, f"no such file, got {node.value!r}; {cure}")
+
+
+def _included(node: Node, slot: Slot, chain: tuple[Path, ...], path: str) -> Node:
     file = _file(node)
     if file is None:
-        known: set[str] = set()
-        with suppress(OSError):  # of a folder that no name can be of
-            known |= {(name.parent / p.name).as_posix() for f in folders for p in (f / name).parent.glob("*.yaml")}
-        known |= {p.relative_to(folders[1]).as_posix() for p in folders[1].glob("*/*.yaml")}
-        if not name.name.endswith(ENDINGS):
-            known = {p.stem for shelf in SHELVES for p in (folders[1] / shelf).glob("*.yaml")}
-        close = nearest(name.as_posix(), sorted(known))
-        help_ = f"; did you mean {close[0]!r}?" if close else ""
-        raise node.place.fault(path, f"no such file, got {node.value!r}{help_}")
+        raise _missing(node, path)
     if file.resolve() in chain:
         names = [shown(f) for f in (*chain[chain.index(file.resolve()) :], file)]
         raise node.place.fault(path, f"a file includes itself, got {' -> '.join(names)}; no circles")
