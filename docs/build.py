@@ -41,6 +41,7 @@ SITE = {  # caption -> pages, in the order of the menu
         "ground/README",
         "docs/integrators",
         "docs/estimation",
+        "docs/discrepancy",
         "docs/validation",
         "docs/proof",
         "rollover/proof/README",

@@ -46,6 +46,7 @@ RUN = [
     "docs/proof.md",
     "docs/validation.md",
     "docs/estimation.md",
+    "docs/discrepancy.md",
     "docs/integrators.md",
     "docs/plan_next_test.md",
     "docs/rops_from_sections.md",
