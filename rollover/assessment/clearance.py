@@ -7,6 +7,7 @@ come near it by deflecting; the ground may enter it where the structure leaves i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ from rollover.spec.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 SPACING = 0.02  # m, of the points that stand for members
+ROWS = 500  # looked at together: bounds the memory of long runs, and how far a body moves meanwhile
+ROUNDING = 1e-9  # m, far above that of distances of some metres
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,11 +118,26 @@ def _in_chassis(points: Array, body: Motion, chassis: Motion, zone: ClearanceZon
     turn = np.einsum("nji,njk->nik", C, R)
     shift = np.einsum("nji,nj->ni", C, body.origin - chassis.origin)
     least = np.empty(len(R))
-    for start in range(0, len(R), 500):  # bounds the memory of long runs
-        part = slice(start, start + 500)
-        local = np.einsum("nij,kj->nki", turn[part], points) + shift[part, None]
+    for start in range(0, len(R), ROWS):
+        part = slice(start, start + ROWS)
+        near = _near(points, turn[part], shift[part], zone)
+        local = np.einsum("nij,kj->nki", turn[part], near) + shift[part, None]
         least[part] = signed_distance(zone, local).min(axis=1)
     return least
+
+
+def _near(points: Array, turn: Array, shift: Array, zone: ClearanceZone) -> Array:
+    """Those of a body's points (k, 3) that may come nearest to the zone in any of some rows.
+
+    A signed distance changes by no more than a point moves, and a rigid body's points move no further than the corners
+    of the box around them: who is further off at the first row than the nearest by twice that, stays behind it.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    corners = np.array(list(product(*zip(low, high, strict=True))))
+    way = np.einsum("nij,kj->nki", turn - turn[0], corners) + (shift - shift[0])[:, None]
+    reach = float(np.linalg.norm(way, axis=-1).max())
+    at_first = signed_distance(zone, points @ turn[0].T + shift[0])
+    return points[at_first <= at_first.min() + 2.0 * reach + ROUNDING]
 
 
 def _stand_ins(member: Shape) -> tuple[Array, float]:

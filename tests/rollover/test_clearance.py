@@ -7,11 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from rollover.assessment.clearance import approaches, protected_margin, signed_distance
 from rollover.dynamics.result import Motion
+from rollover.scenario import load
 from rollover.spec.frames import from_angles
 from rollover.spec.rops import ClearanceZone
+from rollover.spec.shapes import Box, sample
 from rollover.spec.vehicle import Vehicle
 from tests.physics.scenes import shipped
 from tests.viz import example
@@ -132,3 +135,34 @@ def test_the_upper_part_of_a_folding_structure_counts() -> None:
     assert scenario.vehicle.rops is not None
     assert folded.nearest in {member.name for member in scenario.vehicle.rops.parts["rops_upper"][1]}
     assert folded.first_intrusion == run.recording.time[np.argmax(late)]
+
+
+@pytest.mark.parametrize("sway", [0.0, 0.01, 0.3])
+def test_a_roof_is_as_near_as_the_nearest_of_their_points(sway: float) -> None:
+    """A cab's roof that sways, tilts and turns against the chassis, for rows by the thousand."""
+    scenario = load("static_rops_test").replaced({"vehicle": "vehicles/large_tractor.yaml"})
+    vehicle = scenario.vehicle
+    assert isinstance(vehicle, Vehicle)
+    assert vehicle.rops is not None
+    roof = tuple(member for member in vehicle.rops.members if isinstance(member, Box))
+    scenario = replace(scenario, vehicle=replace(vehicle, rops=replace(vehicle.rops, members=roof)))
+    rows, random = 1300, np.random.default_rng(4)
+    time = np.arange(rows) * 1e-3
+    waves = np.sin(np.outer(time, random.uniform(2.0, 30.0, 6)) + random.uniform(0.0, 6.0, 6))
+    angles = np.array([from_angles(*(sway * w)) for w in waves[:, 3:]])
+    resting = np.tile([0.0, 0.0, 0.0, 1.0], (rows, 1))
+    pose = {
+        "chassis": Motion(origin=np.zeros((rows, 3)), quaternion=resting),
+        "rops": Motion(origin=sway * waves[:, :3], quaternion=Rotation.from_matrix(angles).as_quat()),
+    }
+    run = example.overturn()
+    seen = replace(run, scenario=scenario, pose=pose, recording=replace(run.recording, time=time, channels={}))
+    zone = vehicle.rops.clearance_zone
+    assert zone is not None
+    points = np.concatenate([patch.position for member in roof for patch in sample(member, 0.02)])
+    at = [
+        signed_distance(zone, points @ R.T + p).min()
+        for R, p in zip(angles[::50], pose["rops"].origin[::50], strict=True)
+    ]
+    structure = next(a for a in approaches(seen) if a.what == "structure")
+    assert structure.history[::50] == pytest.approx(np.array(at), abs=1e-12)
