@@ -26,7 +26,7 @@ JSON, PAGE = "rops.json", "report.html"
 @app.command(
     "rops",
     epilog=manual(
-        "rops welded_tubes --mass 3000",
+        "rops two_post_rear_tubes_3t --mass 3000",
         "rops static_rops_test --set vehicle.rops=FRAME.yaml",
         writes=f"{JSON}, {PAGE}.",
     ),
@@ -40,7 +40,7 @@ def rops_(
         ),
     ],
     mass: Annotated[
-        float | None, typer.Option(help="Of the vehicle, kg: needed for a ROPS by itself.", min=1.0)
+        float | None, typer.Option(help="Of the vehicle, kg: needed for a ROPS by itself.", min=1.0, max=1e6)
     ] = None,
     segments: Annotated[int, typer.Option(help="Elements to a member.", min=2, max=200)] = 12,
     clamped: Annotated[bool, typer.Option("--clamped", help="Feet held still instead of on their mounts.")] = False,
