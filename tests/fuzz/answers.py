@@ -59,11 +59,13 @@ def own_code() -> Door:
 
 
 def answers() -> Door:
-    """Plans, rolling and stability, by words and by files."""
+    """Plans, rolling, frames and templates, by words and by files."""
     whole = seeds.scenarios("drop_test", "side_overturn")
     # no such effect: a plan ends where its words are read, before it is worked out
     plan = ["plan", "drop_test.yaml", "--between", "mass,nothing", *OUT]
     rolling = ["rolling", "vehicles/vineyard_tractor.yaml", *OUT]
+    frames = {"frame.yaml": whole["vehicles/rops/two_post_rear_tubes_3t.yaml"]}
+    rops = ["rops", "frame.yaml", "--mass", "3000", "--segments", "2", *OUT]
     options = {
         "--sensor": "ground/sinkage",
         "--noise": "0.01",
@@ -84,6 +86,11 @@ def answers() -> Door:
         Seed(name="rolling by name", files=whole, words=rolling, vary=(1,), weight=0.5),
         Seed(name="rolling input", files=whole, words=[*rolling, "--input", "H6=1.6"], vary=(5,)),
         Seed(name="rolling set", files=whole, words=[*rolling, "--set", "vehicle.whole.mass=1600"], vary=(5,)),
+        Seed(name="rops", files=frames, words=rops, touched=("frame.yaml",), weight=2.0),
+        Seed(
+            name="rops set", files=frames, words=[*rops, "--set", "vehicle.rops.feet.0.name=x"], vary=(9,), weight=0.5
+        ),
+        Seed(name="rops numbers", files=frames, words=rops, vary=(3, 5), weight=0.5),
         Seed(name="new", files={}, words=["new", "scenario", "out/mine"], vary=(1,), weight=0.5),
     ]
-    return Door(name="plan, rolling, new", seeds=made, weight=1.5)
+    return Door(name="plan, rolling, rops, new", seeds=made, weight=1.5)
