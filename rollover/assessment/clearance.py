@@ -137,7 +137,7 @@ def _near(points: Array, turn: Array, shift: Array, zone: ClearanceZone) -> Arra
     way = np.einsum("nij,kj->nki", turn - turn[0], corners) + (shift - shift[0])[:, None]
     reach = float(np.linalg.norm(way, axis=-1).max())
     at_first = signed_distance(zone, points @ turn[0].T + shift[0])
-    return points[at_first <= at_first.min() + 2.0 * reach + ROUNDING]
+    return np.asarray(points[at_first <= at_first.min() + 2.0 * reach + ROUNDING])
 
 
 def _stand_ins(member: Shape) -> tuple[Array, float]:

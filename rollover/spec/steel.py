@@ -38,8 +38,8 @@ class Steel:
         """Refuse a steel that softens, and one whose tensile strength is reached before it yields."""
         if self.tensile_strength < self.yield_strength:
             raise ValueError(
-                f"tensile_strength: below the yield strength ({self.yield_strength:g} Pa), got "
-                f"{self.tensile_strength:g}; at least that"
+                f"yield_strength: above the tensile strength ({self.tensile_strength:g} Pa), got "
+                f"{self.yield_strength:g}; at most that, or another tensile_strength beside it"
             )
         if self.uniform_strain <= self.tensile_strength / self.youngs_modulus:
             raise ValueError(

@@ -47,6 +47,11 @@ class Place:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
 
+    def unchanged(self) -> None:
+        """The seed as it is, unjudged: what is imported or compiled at its first use is of no input's making."""
+        judge(self.folder, list(self.seed.words), longest=600.0)
+        self._make()
+
     def judged(self, rng: random.Random) -> tuple[Verdict, dict[str, bytes], list[str]]:
         """One input of this seed."""
         files, words = an_input(self.seed, rng)
@@ -92,6 +97,7 @@ def campaign(
         key = (door.name, at)
         if key not in places:
             places[key] = Place(folder / f"seed{len(places)}", door.seeds[at])
+            places[key].unchanged()
         verdict, files, words = places[key].judged(rng)
         _count(done, door, door.seeds[at], verdict, words, keep, files)
         if say is not None and (k + 1) % 500 == 0:

@@ -135,7 +135,9 @@ def _reset_peak() -> int:
     return _status("VmRSS")
 
 
-def judge(folder: Path, words: Sequence[str], out: str = "out", *, whole: bool = False) -> Verdict:
+def judge(
+    folder: Path, words: Sequence[str], out: str = "out", *, whole: bool = False, longest: float = LONGEST
+) -> Verdict:
     """Call the command in a folder in which only `out` may be written to, and judge it; `out` is gone afterwards.
 
     With `whole` results stood there before: a refusal leaves them.
@@ -162,7 +164,7 @@ def judge(folder: Path, words: Sequence[str], out: str = "out", *, whole: bool =
             contextlib.redirect_stdout(stdout),
             contextlib.redirect_stderr(stderr),
             warnings.catch_warnings(record=True) as warned,
-            _limited(LONGEST),
+            _limited(longest),
         ):
             warnings.simplefilter("default")
             warnings.simplefilter("ignore", ResourceWarning)  # nobody is shown them

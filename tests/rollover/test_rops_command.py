@@ -141,9 +141,16 @@ def test_thin_walls_are_told(tmp_path) -> None:
     assert json.loads(stocky.stdout)["warnings"] == []
 
 
-def test_a_crushing_beam_lies_on_the_posts(tmp_path) -> None:
+@pytest.mark.parametrize("begins_with", ["post", "crossbar"])
+def test_a_crushing_beam_lies_on_the_posts(begins_with: str, tmp_path) -> None:
     """60 kN in the middle of the beam would be P L/8 = 7.5 kN m, beyond its 6.3 kN m; on the posts nothing yields."""
-    scenario = scenario_of(written(tmp_path, "[60, 60, 4]"), 3000.0)
+    file = written(tmp_path, "[60, 60, 4]")
+    if begins_with == "crossbar":  # the beam ends 50 mm outside its posts, whoever of them is named first
+        lines = file.read_text().splitlines(keepends=True)
+        beam = next(k for k, line in enumerate(lines) if "name: crossbar" in line)
+        lines.insert(beam - 2, lines.pop(beam))
+        file.write_text("".join(lines))
+    scenario = scenario_of(file, 3000.0)
     (crush,) = frame_test(scenario.replaced({"initiation.loads": [{"name": "crush", "asks": "crush"}]})).tests
     assert (crush["status"], crush["hinges"], crush["first_yield"]) == ("reached", [], None)
     assert crush["force"] == pytest.approx(60e3, rel=1e-5)

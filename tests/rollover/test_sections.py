@@ -212,7 +212,7 @@ def test_a_file_gives_sections_and_steels_by_name(tmp_path) -> None:
         (
             "{tube: [80, 80, 4]}",
             "{base: S355, yield_strength: 600.0e6}",
-            "tensile_strength: below the yield strength (6e+08 Pa)",
+            "yield_strength: above the tensile strength (4.9e+08 Pa), got 6e+08",
         ),
         (
             "{tube: [80, 80, 4]}",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -70,12 +70,11 @@ def mesh(beams: Sequence[Beam], points: Mapping[str, Sequence[float]], segments:
     for i, b in enumerate(beams):
         for s, end in ((0.0, b.start), (b.length, b.end)):
             breaks[i][node(np.array(end), sizes[i])] = s
-    for i, _ in enumerate(beams):
-        for k in list(breaks[i]):
-            for j, other in enumerate(beams):
-                s, off = _foot(other, places[k])
-                if j != i and k not in breaks[j] and off <= sizes[i] + sizes[j]:
-                    _break(breaks[j], other, s, k, sizes[i] + sizes[j], places)
+    for _, s, i, k, j in sorted(_touches(beams, breaks, places, sizes)):  # who meets an axis before who is beside it
+        shared = [m for m in breaks[i] if m in breaks[j]]
+        is_joined = any(np.linalg.norm(places[m] - places[k]) <= sizes[i] + sizes[j] for m in shared)
+        if not is_joined:  # two members meet once: a beam's end beyond its post is free
+            _break(breaks[j], beams[j], s, k, places)
     found: dict[str, int] = {}
     for name, point in points.items():
         p = np.array(point, dtype=float)
@@ -96,6 +95,18 @@ def mesh(beams: Sequence[Beam], points: Mapping[str, Sequence[float]], segments:
     return _divided(tuple(beams), places, breaks, segments, found)
 
 
+def _touches(
+    beams: Sequence[Beam], breaks: Sequence[Mapping[int, float]], places: Sequence[Array], sizes: Sequence[float]
+) -> Iterator[tuple[float, float, int, int, int]]:
+    """Ends `k` of members `i` at the axes of others `j`: how far off (m), at which place along the axis, `i`, `k`, `j`."""
+    for i, of in enumerate(breaks):
+        for k in of:
+            for j, other in enumerate(beams):
+                s, off = _foot(other, places[k])
+                if j != i and off <= sizes[i] + sizes[j]:
+                    yield off, s, i, k, j
+
+
 def _foot(b: Beam, p: Array) -> tuple[float, float]:
     """Place along a member nearest to a point, and how far that is off, m."""
     way = p - np.array(b.start)
@@ -103,7 +114,7 @@ def _foot(b: Beam, p: Array) -> tuple[float, float]:
     return s, float(np.linalg.norm(way - s * b.axes[0]))
 
 
-def _break(breaks: dict[int, float], b: Beam, s: float, k: int, tolerance: float, places: list[Array]) -> None:
+def _break(breaks: dict[int, float], b: Beam, s: float, k: int, places: list[Array]) -> None:
     """A joint within a member; near its end it is the end itself, unless something else is there already."""
     for end, place in list(breaks.items()):
         if place in (0.0, b.length) and np.linalg.norm(places[end] - places[k]) <= SAME:
