@@ -127,7 +127,7 @@ def test_only_whole_turns_are_told_as_wraps(which: int) -> None:
     assert told == {ANGLES[which]: 1.0}
 
 
-def test_an_angle_that_turns_no_whole_turns_has_no_means_over_wraps() -> None:
+def test_an_angle_within_one_turn_has_no_means_over_wraps() -> None:
     """A prescribed steering angle is read as it is: nothing of it becomes a gap, and none is told."""
     noise = np.random.default_rng(1).normal(0.0, 1e-3, 1200)
     values = means(wrapped(2.5041 + SLOW * np.arange(1200) / 100.0 + noise, -math.pi), 2)

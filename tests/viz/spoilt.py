@@ -1,19 +1,33 @@
-"""Pages of plans, rolling and stability in which one text stands wherever a word from data may."""
+"""Pages of plans, rolling, frames and stability in which one text stands wherever a word from data may."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
+from rollover.assessment import frame_account
+from rollover.assessment.frame_test import frame_test
 from rollover.assessment.rolled import account, rolled
 from rollover.assessment.standing import scenario_of
 from rollover.diagnosis.planning.next_test import Advice, NextTest
 from rollover.diagnosis.planning.plan import Detectable, Pair, Plan
 from viz.pages import plan as plan_page
 from viz.pages import rolling as rolling_page
+from viz.pages import rops as rops_page
 from viz.pages import stability as stability_page
 
-OWN = ("verdict", "symbol")  # of an account: words of the program alone, by which a page decides
+OWN = (
+    "verdict",
+    "symbol",
+    "kind",
+    "status",
+    "come_from",
+    "quantity",
+    "confidence",
+    "unit",
+    "corners",
+)  # of an account: words of the program alone, by which a page decides
 
 
 def everywhere(value: Any, text: str) -> Any:
@@ -55,6 +69,16 @@ def _rolling(text: str) -> str:
     return rolling_page.page({**answer, "outside": [text], "versions": {text: text}}, command=text)
 
 
+@functools.cache
+def _pushed() -> dict[str, Any]:
+    return frame_account.account(frame_test(frame_account.scenario_of("two_post_rear_tubes_3t", 3000.0), segments=4))
+
+
+def _rops(text: str) -> str:
+    answer = everywhere(_pushed(), text)
+    return rops_page.page({**answer, "scenario_hash": text, "versions": {text: text}}, command=text)
+
+
 def _stability(text: str) -> str:
     closed = {"free_pivot_deg": None, "rigid_deg": 30.0}
     row = {
@@ -75,4 +99,4 @@ def _stability(text: str) -> str:
     return stability_page.page(answer, command=text)
 
 
-PAGES: dict[str, Callable[[str], str]] = {"plan": _plan, "rolling": _rolling, "stability": _stability}
+PAGES: dict[str, Callable[[str], str]] = {"plan": _plan, "rolling": _rolling, "stability": _stability, "rops": _rops}

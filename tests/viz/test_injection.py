@@ -54,7 +54,7 @@ MARKS = (
 )
 HOSTILE = " ".join(MARKS)
 KINDS = ("run", "compare", "two runs", "diagnose", "prove", "regress", "study", "calibrate", "every block", "viewer")
-KINDS += ("plan", "rolling", "stability")
+KINDS += tuple(spoilt.PAGES)
 ABOUT: dict[str, Any] = {"scenario_hash": HOSTILE, "versions": {HOSTILE: HOSTILE}}
 
 
@@ -123,7 +123,7 @@ def page_of(kind: str, folder: Path) -> str:
         study, done = made_up(folder, 120)
         study = replace(study, title=HOSTILE)
         return study_page.page(study, done, made_account(study, done), command=HOSTILE)
-    if kind in ("plan", "rolling", "stability"):
+    if kind in spoilt.PAGES:
         return spoilt.PAGES[kind](HOSTILE)
     if kind == "calibrate":
         return calibration.page(calibrated(), command=HOSTILE, **ABOUT)

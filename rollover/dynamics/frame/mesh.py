@@ -98,7 +98,7 @@ def mesh(beams: Sequence[Beam], points: Mapping[str, Sequence[float]], segments:
 def _touches(
     beams: Sequence[Beam], breaks: Sequence[Mapping[int, float]], places: Sequence[Array], sizes: Sequence[float]
 ) -> Iterator[tuple[float, float, int, int, int]]:
-    """Ends `k` of members `i` at the axes of others `j`: how far off (m), at which place along the axis, `i`, `k`, `j`."""
+    """Ends `k` of members `i` at the axes of others `j`: how far off (m), place along the axis (m), `i`, `k`, `j`."""
     for i, of in enumerate(breaks):
         for k in of:
             for j, other in enumerate(beams):
