@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, permutations
 
 import numpy as np
 import pytest
@@ -310,3 +310,19 @@ def test_a_thrust_adds_to_the_moment() -> None:
     sway = [p.state.u[tip] for p in curve]
     found = float(np.interp(thrust / ratio, [p.force for p in curve], sway))
     assert found == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("order", list(permutations(range(3))))
+@pytest.mark.parametrize("beyond", [0.0, 0.05, 0.3])
+def test_members_meet_once_and_keep_their_axes(order: tuple[int, ...], beyond: float) -> None:
+    """A beam that ends beyond its posts (m), within what touches and out of it: two joints, whoever is named first."""
+    left, right, _ = portal(1.5, 1.0)
+    across = bar("across", (0.0, 0.5 + beyond, 1.5), (0.0, -0.5 - beyond, 1.5))
+    made = mesh([(left, right, across)[k] for k in order], {}, 8)
+    assert sorted(round(float(made.nodes[k, 1]), 9) for k in made.joints) == [-0.5, 0.5]
+    for ends, k in zip(made.ends, made.beam, strict=True):
+        b = made.beams[k]
+        off = np.cross(made.nodes[ends] - np.array(b.start), b.axes[0])
+        assert np.abs(off).max() < 1e-9, b.name
+    total = sum(float(made.length[made.beam == k].sum()) for k in range(3))
+    assert total == pytest.approx(2 * 1.5 + 1.0 + 2.0 * beyond, rel=1e-12)

@@ -70,11 +70,7 @@ def mesh(beams: Sequence[Beam], points: Mapping[str, Sequence[float]], segments:
     for i, b in enumerate(beams):
         for s, end in ((0.0, b.start), (b.length, b.end)):
             breaks[i][node(np.array(end), sizes[i])] = s
-    for _, s, i, k, j in sorted(_touches(beams, breaks, places, sizes)):  # who meets an axis before who is beside it
-        shared = [m for m in breaks[i] if m in breaks[j]]
-        is_joined = any(np.linalg.norm(places[m] - places[k]) <= sizes[i] + sizes[j] for m in shared)
-        if not is_joined:  # two members meet once: a beam's end beyond its post is free
-            _break(breaks[j], beams[j], s, k, places)
+    _join(beams, breaks, places, sizes)
     found: dict[str, int] = {}
     for name, point in points.items():
         p = np.array(point, dtype=float)
@@ -114,12 +110,37 @@ def _foot(b: Beam, p: Array) -> tuple[float, float]:
     return s, float(np.linalg.norm(way - s * b.axes[0]))
 
 
-def _break(breaks: dict[int, float], b: Beam, s: float, k: int, places: list[Array]) -> None:
-    """A joint within a member; near its end it is the end itself, unless something else is there already."""
-    for end, place in list(breaks.items()):
-        if place in (0.0, b.length) and np.linalg.norm(places[end] - places[k]) <= SAME:
-            return
-    breaks[k] = s
+def _join(
+    beams: Sequence[Beam], breaks: list[dict[int, float]], places: Sequence[Array], sizes: Sequence[float]
+) -> None:
+    """Joints where ends touch others: within a member a node more, at its end one node for both.
+
+    Who meets an axis comes before who is beside it, and two members meet once, be it through a third: the end of a beam
+    beyond its post is free.
+    """
+    now = {k: k for of in breaks for k in of}  # nodes that became one with another
+    for _, s, i, end, j in sorted(_touches(beams, breaks, places, sizes)):
+        k = now[end]
+        if _is_joined(breaks, places, i, j, k, sizes[i] + sizes[j]):
+            continue
+        ends = [m for m, place in breaks[j].items() if abs(place - s) <= SAME]
+        for old in ends:
+            for of in breaks:
+                if old in of:
+                    of[k] = of.pop(old)
+            now = {name: k if at == old else at for name, at in now.items()}
+        breaks[j][k] = s
+
+
+def _is_joined(
+    breaks: Sequence[Mapping[int, float]], places: Sequence[Array], i: int, j: int, k: int, near: float
+) -> bool:
+    """Whether members `i` and `j` hang together by nodes that are near a node `k` (m)."""
+    around = {m for m, p in enumerate(places) if np.linalg.norm(p - places[k]) <= near}
+    group, rest = set(breaks[i]) & around, [set(of) & around for of in breaks]
+    while more := [of for of in rest if of & group and not of <= group]:
+        group = group.union(*more)
+    return bool(group & set(breaks[j]))
 
 
 def _divided(
