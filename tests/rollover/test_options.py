@@ -75,3 +75,17 @@ def test_scripts_are_held_to_the_same(late: float) -> None:
 def test_noise_beyond_all_numbers_is_refused() -> None:
     with pytest.raises(InputError, match=r"noise: beyond all numbers, got .* for ground/force_normal; a smaller"):
         ro.synthesize("drop_test", sigmas={"ground/force_normal": 1e308})
+
+
+@pytest.mark.parametrize("words", [["--effects", "\ud800"], ["run", "\ud800"], ["check", "a.yaml", "--\ud800"]])
+def test_half_a_character_is_no_word(words: list[str]) -> None:
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 2
+    assert result.stderr.splitlines()[0].startswith("rollover: not text, got '")
+    assert is_whole(result.stderr.strip()) == ""
+
+
+def test_a_name_that_is_no_text_in_any_encoding_is_a_name() -> None:
+    result = CliRunner().invoke(app, ["check", "gone\udcff.yaml"])
+    assert result.exit_code == 2
+    assert "no such" in result.stderr

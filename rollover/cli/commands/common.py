@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
+import os
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor
@@ -96,6 +97,9 @@ class Before(TyperGroup):
         more = {"complete_var": complete_var, "windows_expand_args": windows_expand_args, **extra}
         if not standalone_mode:
             return super().main(args, prog_name, standalone_mode=False, **more)
+        if (odd := _no_text(sys.argv[1:] if args is None else args)) is not None:
+            print(Fault(file="rollover", message=f"not text, got {ascii(odd)}; characters are needed"), file=sys.stderr)
+            sys.exit(WRONG_INPUT)
         try:
             status = super().main(args, prog_name, standalone_mode=False, **more)
         except typer.Abort:
@@ -120,6 +124,16 @@ class Before(TyperGroup):
             if opt in own:
                 ctx.fail(f"{opt} stands before the command: rollover {opt} {own[opt]} {name} ...")
         return name, command, rest
+
+
+def _no_text(words: Sequence[str]) -> str | None:
+    """The first word that no system could have passed on: half a character by itself."""
+    for word in words:
+        try:
+            os.fsencode(word)
+        except UnicodeEncodeError:
+            return word
+    return None
 
 
 def _usage(e: Any) -> Fault:
