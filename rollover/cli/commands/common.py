@@ -98,7 +98,7 @@ class Before(TyperGroup):
         if not standalone_mode:
             return super().main(args, prog_name, standalone_mode=False, **more)
         if (odd := _no_text(sys.argv[1:] if args is None else args)) is not None:
-            print(Fault(file="rollover", message=f"not text, got {ascii(odd)}; characters are needed"), file=sys.stderr)
+            print(Fault(file="rollover", message=f"not text, got {odd!a}; characters are needed"), file=sys.stderr)
             sys.exit(WRONG_INPUT)
         try:
             status = super().main(args, prog_name, standalone_mode=False, **more)
