@@ -19,7 +19,7 @@ from rollover.spec.initiation import Driving, Standing, TipOver
 from rollover.spec.stand import PendulumBlow, StaticTest, TiltTable
 from rollover.spec.standards.codes import STANDARDS, STATIC
 from rollover.spec.standards.requirement import Requirement
-from rollover.spec.standards.static_sequence import code_of, sequence, tractor_of
+from rollover.spec.standards.static_sequence import sequence, tractor_of, usual_code
 from rollover.spec.vehicle import Vehicle
 
 __all__ = ["Criterion", "Verdict", "criteria", "in_words", "rops_share", "tractor_of", "with_half_step"]
@@ -79,10 +79,7 @@ def _standards(run: Run, vehicle: Vehicle) -> tuple[str, ...]:
         return run.scenario.loads.standards
     if isinstance(begin, StaticTest) and begin.code is not None:
         return (begin.code,)
-    try:
-        return (code_of(vehicle),)
-    except ValueError:
-        return ("code-4",)
+    return (usual_code(vehicle),)
 
 
 def _once(run: Run, asked: Sequence[Requirement]) -> list[Requirement]:

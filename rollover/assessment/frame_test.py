@@ -28,7 +28,7 @@ from rollover.spec.feet import REACH
 from rollover.spec.rops import Rops
 from rollover.spec.stand import DIRECTION, StaticTest
 from rollover.spec.standards.codes import STANDARDS, STATIC
-from rollover.spec.standards.static_sequence import BEAM, Push, code_of, sequence, tractor_of
+from rollover.spec.standards.static_sequence import BEAM, Push, sequence, tractor_of, usual_code
 from rollover.spec.vehicle import Vehicle
 from rollover.system.errors import Fault, InputError
 
@@ -82,7 +82,7 @@ def frame_test(
             progress(k + 1, len(loads))
     # as the sequence: a listed second lengthways load is asked, a frame of itself is only asked where it folds
     tractor = tractor_of(vehicle, folding=True if test.loads is not None else None)
-    names = scenario.loads.standards or (test.code or _code(vehicle),)
+    names = scenario.loads.standards or (test.code or usual_code(vehicle),)
     asked = [r for name in names for r in STANDARDS[name](tractor)]
     rows: list[Criterion] = []
     for load, requirement in pairs(loads, asked):
@@ -100,13 +100,6 @@ def frame_test(
         criteria=tuple(rows),
         last=state,
     )
-
-
-def _code(vehicle: Vehicle) -> str:
-    try:
-        return code_of(vehicle)
-    except ValueError:
-        return "code-4"
 
 
 def _refuse(rops: Rops) -> None:
