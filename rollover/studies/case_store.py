@@ -6,6 +6,7 @@ the same scenario share a file.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,7 +38,7 @@ FILES = (ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK)
 TOLD = ("finished", "wall_time", "cpu_time", "peak_memory", "host", "process", "integrator")
 PROVENANCE_UNITS = {"wall_time": "s", "cpu_time": "s", "peak_memory": "B"}
 _TYPES = dict.fromkeys(("wall_time", "cpu_time", "peak_memory", "process"), (int, float))  # of what is told; else text
-
+_OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 __all__ = [
     "Row",
@@ -135,7 +136,12 @@ def locked(folder: Path) -> Iterator[None]:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise _refused(folder, "is being worked on by another process; wait for it, or another --out") from None
-        yield
+        try:
+            yield
+        except OSError as e:
+            if e.errno in _OF_THE_DISK and e.filename is None:  # a write names no file
+                e.filename = str(folder)
+            raise
 
 
 def _opened(folder: Path) -> IO[str]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
+import os
 from pathlib import Path
 from typing import Any
 
@@ -370,3 +372,11 @@ def test_the_worst_case_repeats(tmp_path: Path) -> None:
     peak = next(p for p in told["peak_loads"] if p["channel"] == "ground/force_normal")
     assert peak["filtered"] == worst["value"] == max(peaks)
     assert told["scenario_hash"] == worst["scenario_hash"]
+
+
+@pytest.mark.parametrize(("reason", "named"), [(errno.ENOSPC, True), (errno.EPIPE, False)])
+def test_a_disk_that_refuses_a_write_is_named(reason: int, named: bool, tmp_path: Path) -> None:
+    # what a library writes to an open file raises without a name; who has stopped reading is no disk
+    with pytest.raises(OSError, match=os.strerror(reason)) as fault, case_store.locked(tmp_path):
+        raise OSError(reason, os.strerror(reason))
+    assert (fault.value.filename == str(tmp_path)) is named
