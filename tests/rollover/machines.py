@@ -22,6 +22,23 @@ from tests.ground.recorded_drops import recorded as recorded_drops
 from tests.rollover import studies
 
 WRONG, MACHINE = 2, 74
+# words of the lines that say how far a command is
+PROGRESS = (
+    "ompil",
+    "cases",
+    "simulating",
+    "runs",
+    "headings",
+    "Sealed",
+    "sensors",
+    "looking at",
+    "fits of",
+    "fitted",
+    "depends",
+    "effects in",
+    "pairs",
+    "apart",
+)
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no such locks, links and limits")
 
 

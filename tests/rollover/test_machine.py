@@ -20,6 +20,7 @@ from tests.rollover.disks import Disk
 from tests.rollover.machines import (
     MACHINE,
     NAMES,
+    PROGRESS,
     WRONG,
     as_it_is,
     commands,
@@ -32,22 +33,6 @@ from viz.pages.web_page import Viewer
 
 QUICK = ("import", "import parquet", "import mme", "synthesize", "view", "new", "rolling")
 QUICK += ("export", "export xlsx", "export mat", "export mme")
-PROGRESS = (
-    "ompil",
-    "cases",
-    "simulating",
-    "runs",
-    "headings",
-    "Sealed",
-    "sensors",
-    "looking at",
-    "fits of",
-    "fitted",
-    "depends",
-    "effects in",
-    "pairs",
-    "apart",
-)
 WORK = (
     "rollover.diagnosis.sensors_first.diagnosed",
     "rollover.diagnosis.overlay.series",
