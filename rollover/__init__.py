@@ -176,7 +176,8 @@ def run(scenario: str | Path | Scenario, *, half_step: bool = True, ensemble: in
 def _page(run: Run) -> str:
     from viz.pages.report import page
 
-    return page(run.result, run.peaks, run.account, rows=run.criteria, command="rollover.run(scenario)")
+    command = "rollover.run(scenario)"
+    return page(run.result, run.peaks, run.account, rows=run.criteria, near=run.approaches, command=command)
 
 
 def compare(

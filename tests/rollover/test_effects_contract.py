@@ -24,6 +24,7 @@ from rollover.scenario import Scenario
 from rollover.spec.channels import is_known
 from rollover.system.errors import InputError
 from tests.physics.scenes import shipped
+from tests.rollover import forked
 
 # ids and parameters that users and recordings rely on
 PROMISED: dict[str, set[str]] = {
@@ -218,6 +219,8 @@ def test_a_wrong_effect_is_one_line_with_the_nearest() -> None:
 def outside(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
     """A process of its own: an effect once defined stays in the table of its process."""
     root = Path(__file__).parents[2]
+    if arguments[:2] == ("-m", forked.COMMAND) and not variables:
+        return forked.command(*arguments[2:], cwd=root)
     path = os.pathsep.join([str(root), os.environ.get("PYTHONPATH", "")])
     env = {**os.environ, "PYTHONPATH": path, **variables}
     return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, env=env, cwd=root, check=False)

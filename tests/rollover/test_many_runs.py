@@ -114,7 +114,7 @@ def test_workers_change_no_bit_of_the_answer(tmp_path: Path) -> None:
         folder, way = tmp_path / str(workers), Way(workers=workers)
         done = conduct(study, folder, way)
         tables.append((folder / case_store.TABLE).read_bytes())
-        checks.append(reference.checked(study, folder, way, done))
+        checks.append(reference.checked(study, folder, way, done, reference.chosen(study, done)))
     assert tables[0] == tables[1]
     assert checks[0] == checks[1]
 
@@ -166,7 +166,7 @@ def test_the_check_counts_what_ended_otherwise(tmp_path: Path, monkeypatch: pyte
     higher = {**rows[0].measures, "ground/force_normal": rows[0].measures["ground/force_normal"] / 1.25}
     none = replace(rows[1], status="failed", measures={})
     monkeypatch.setattr(reference, "evaluate", lambda *_: [replace(rows[0], measures=higher), none, rows[2]])
-    check = reference.checked(study, tmp_path, Way(), done)
+    check = reference.checked(study, tmp_path, Way(), done, at)
     assert check is not None
     assert (check["cases"], check["ended_otherwise"]) == (3, 1)
     force, sinkage = check["outputs"]

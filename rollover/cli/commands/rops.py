@@ -19,6 +19,7 @@ from rollover.cli.commands.common import (
     manual,
     settings,
 )
+from rollover.system.arguments import SEGMENTS
 
 JSON, PAGE = "rops.json", "report.html"
 
@@ -42,7 +43,7 @@ def rops_(
     mass: Annotated[
         float | None, typer.Option(help="Of the vehicle, kg: needed for a ROPS by itself.", min=1.0, max=1e6)
     ] = None,
-    segments: Annotated[int, typer.Option(help="Elements to a member.", min=2, max=200)] = 12,
+    segments: Annotated[int, typer.Option(help="Elements to a member.", min=2, max=200)] = SEGMENTS,
     clamped: Annotated[bool, typer.Option("--clamped", help="Feet held still instead of on their mounts.")] = False,
     set_: Setting = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/rops/NAME")] = None,
@@ -72,7 +73,7 @@ def rops_(
         raise typer.Exit(FAILED) from None
     answer = account(found, about)
     words = [] if mass is None else ["--mass", f"{mass:g}"]
-    words += ["--segments", str(segments)] if segments != 12 else []
+    words += ["--segments", str(segments)] if segments != SEGMENTS else []
     words += ["--clamped"] if clamped else []
     words += [word for s in set_ or [] for word in ("--set", s)]
     text = page(answer, command=" ".join(map(shlex.quote, ["rollover", "rops", name, *words])))
