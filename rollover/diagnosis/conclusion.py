@@ -280,5 +280,5 @@ def marginalised_at_fit(
     fitted = refitted_with_conditions(problem, explanation.fitted)
     beside = problem.changes(fitted.candidates, fitted.x)
     after = mismatch_of(problem.dataset, fitted.blocks, phases)
-    validation = [with_uncertain_conditions_at(e, beside) for e in validation]
-    return replace(explanation, fitted=fitted, after=after), validation
+    uncertain = [with_uncertain_conditions_at(e, beside) for e in validation]
+    return replace(explanation, fitted=fitted, after=after), uncertain

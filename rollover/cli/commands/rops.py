@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,8 +15,9 @@ from rollover.cli.commands.common import (
     Setting,
     answering,
     app,
+    hand_out,
     manual,
-    settings,
+    with_settings,
 )
 from rollover.system.arguments import SEGMENTS
 
@@ -58,9 +58,7 @@ def rops_(
     from rollover.spec import document
     from viz.pages.rops import page
 
-    chosen = scenario_of(name, mass)
-    if set_:
-        chosen = chosen.replaced(settings(set_), origin="--set")
+    chosen = with_settings(scenario_of(name, mass), set_)
     folder = out or Path("out", "rops", Path(name).stem)
     about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), **chosen.own_code}
     about["origin"] = results.origin(file_of(name), folder, set_ or [])
@@ -77,10 +75,4 @@ def rops_(
     words += ["--clamped"] if clamped else []
     words += [word for s in set_ or [] for word in ("--set", s)]
     text = page(answer, command=" ".join(map(shlex.quote, ["rollover", "rops", name, *words])))
-    with results.whole(folder) as part:
-        results.write_json(part / JSON, answer)
-        (part / PAGE).write_text(text, encoding="utf-8")
-    if as_json:
-        print(json.dumps(answer, indent=2))
-    else:
-        console.rops(answer, str(folder))
+    hand_out(answer, text, folder, (JSON, PAGE), as_json=as_json, show=lambda: console.rops(answer, str(folder)))

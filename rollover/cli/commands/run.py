@@ -24,7 +24,7 @@ from rollover.cli.commands.common import (
     answering,
     app,
     manual,
-    settings,
+    scenario_with,
 )
 
 if TYPE_CHECKING:
@@ -71,12 +71,7 @@ def run(
     from rollover.cli import console
     from rollover.spec import document
 
-    path = document.find(scenario)
-    from rollover import scenario as scenarios
-
-    chosen = scenarios.load(path)
-    if set_:
-        chosen = chosen.replaced(settings(set_), origin="--set")
+    path, chosen = scenario_with(scenario, set_)
     for line in chosen.idle:
         console.say(f"{path}: {line}")
     compiles = not is_warm(chosen.integrator)
