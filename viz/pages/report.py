@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -279,11 +280,11 @@ def _ledger(run: Run) -> list[Block]:
         return []
     values = {name: 1e-3 * value for name, value in run.ledger.items() if known(value)}
     residual = run.ledger.get("residual", float("nan"))
-    share = f", {_percent(abs(residual) / run.released)} of the {joules(run.released)} released" if run.released else ""
+    closed = closure(run)
+    share = f", {_percent(closed.end)} of the {joules(run.released)} released" if math.isfinite(closed.end) else ""
     svg = plots.bars(values, label="energy at the end, kJ", roles={"residual": "limit"})
     caption = f"The energy ledger at the end of the run: {joules(residual)} unaccounted for{share}."
     blocks: list[Block] = [Figure(svg=svg, caption=caption)]
-    closed = closure(run)
     if closed.is_wide:
         blocks.insert(0, Note(text=f"{title(closed.warning)}.", warning=True))
     elif closed.sentence:
