@@ -35,8 +35,8 @@ from rollover.diagnosis.selection.decision import (
     Explanation,
     by_first_effect,
     explained,
+    explains_little,
     redundant_effects,
-    takes_little,
     verdict_on,
 )
 from rollover.diagnosis.settings import SETTINGS
@@ -217,11 +217,11 @@ def weighed(
         shown = intrinsic_faults(found, recordings, phases, explanation.p_value) or misread(
             inconsistencies, len(found), explanation.p_value
         )
-    elif effects and takes_little(explanation, groups, TUNING.main_share):
+    elif effects and explains_little(explanation, groups, TUNING.main_share):
         # what is lost again and again is met by no effect, and bends those that are fitted to it
         shown = truncation_fault(found, recordings, phases, explanation.p_value)
         if shown is not None and not (
-            takes_little(explanation, groups) or shown.is_covered_by(e.channel for e in effects)
+            explains_little(explanation, groups) or shown.is_covered_by(e.channel for e in effects)
         ):
             shown = None  # what another channel loses is no reason to doubt them
     if shown is not None:

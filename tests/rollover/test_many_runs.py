@@ -73,10 +73,10 @@ def test_a_study_is_compiled_and_exudyn_looks_at_a_hundredth(tmp_path: Path) -> 
     assert [o["name"] for o in check["outputs"]] == ["ground/force_normal", "ground/sinkage"]
     provenance, _ = read_table(tmp_path / "out" / case_store.PROVENANCE)
     assert provenance["integrator"] == ["compiled"] * 4
-    assert len(case_store.on_shelf(tmp_path / "out")) == 5
+    assert len(case_store.stored_keys(tmp_path / "out")) == 5
     # where nothing is lacking nothing is run, Exudyn's case neither
     assert carried_out(tmp_path, FULL, FEW)["reference_check"] == check
-    assert len(case_store.on_shelf(tmp_path / "out")) == 5
+    assert len(case_store.stored_keys(tmp_path / "out")) == 5
 
 
 def test_who_states_exudyn_has_it_and_the_same_answer(tmp_path: Path) -> None:
