@@ -78,7 +78,7 @@ def resolution(run: Run) -> float:
     """
     vehicle, simulation = run.scenario.vehicle, run.scenario.simulation
     weight = run.scenario.gravity * (vehicle.mass if isinstance(vehicle, Striker) else vehicle.whole.mass)
-    height = max(float(np.abs(motion.origin[:, 2]).max()) for motion in run.pose.values())
+    height = max((float(np.abs(motion.origin[:, 2]).max()) for motion in run.pose.values()), default=0.0)
     rounded = np.finfo(float).eps * weight * height * (simulation.duration / simulation.step)
     wheels = vehicle.wheels if isinstance(vehicle, Vehicle) else ()
     stiffness = sum(w.tyre.vertical_stiffness for w in wheels)
