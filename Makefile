@@ -10,19 +10,26 @@ TESTED := .venv/.tested
 GROUPS := --group formats --group oracle --group studies --group posterior --group browser --group docs
 CORE := .venv/core
 
-.PHONY: demo test test-core docs view setup lint bench clean
+.PHONY: demo test test-core kernels docs view setup lint bench clean
 
 demo: setup
 	.venv/bin/rollover run side_overturn --set simulation.step=0.0005 --out out/demo --force
 	@echo "Look at it with: .venv/bin/rollover view out/demo"
 
-test: $(TESTED) lint test-core
-	.venv/bin/pytest -n auto --strict-skips tests
+# what takes one core goes side by side; worksteal keeps a module's tests, and what they share, with one worker
+test: $(TESTED)
+	@$(MAKE) --no-print-directory -j lint test-core
+	.venv/bin/pytest -n auto --dist worksteal --strict-skips tests
 
-# an environment without any optional package: what needs one says so in one line
-test-core: setup
+# an environment without any optional package: what needs one says so in one line; its kernels are the same
+test-core: kernels
 	UV_PROJECT_ENVIRONMENT=$(CORE) $(UV) sync --locked --quiet --python $(PYTHON)
-	$(CORE)/bin/pytest -q tests/core_only
+	NUMBA_CACHE_DIR="$$(.venv/bin/python -c 'from ground.compiled import KEPT; print(KEPT)')" \
+	  $(CORE)/bin/pytest -q tests/core_only
+
+# once, before the workers of the tests would compile the same at the same time
+kernels: setup
+	.venv/bin/python -m tests.kernels
 
 docs: $(TESTED)
 	.venv/bin/python docs/build.py out/site

@@ -173,10 +173,10 @@ def run(scenario: str | Path | Scenario, *, half_step: bool = True, ensemble: in
     return replace(found, peaks=with_scatter(found.peaks, chosen, ensemble, workers))
 
 
-def _page(run: Run) -> str:
+def _page(of: Run) -> str:
     from viz.pages.report import page
 
-    return page(run.result, run.peaks, run.account, rows=run.criteria, command="rollover.run(scenario)")
+    return page(of.result, of.peaks, of.account, rows=of.criteria, near=of.approaches, command="rollover.run(scenario)")
 
 
 def compare(

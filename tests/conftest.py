@@ -17,6 +17,25 @@ MISSING = {
 }
 
 
+# with tests that take a minute: begun at the end one of them would leave the other workers idle for as long
+LONG = (
+    "tests/corpus/",
+    "tests/viz/test_shipped.py",
+    "tests/fuzz/",
+    "tests/diagnosis/test_blind.py",
+    "tests/diagnosis/test_discrepancy.py",
+    "tests/diagnosis/test_whole_pairs.py",
+    "tests/rollover/test_killed.py",
+    "tests/rollover/test_study_faults.py",
+    "tests/rollover/test_readme.py",
+    "tests/real/",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: not item.nodeid.startswith(LONG))
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--strict-skips", action="store_true", help="fail where a skip is not the machine's or the data's")
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from rollover.assessment import results
+from rollover.assessment.clearance import Approach, approaches
 from rollover.assessment.criteria import criteria, with_half_step
 from rollover.assessment.criterion import Criterion
 from rollover.assessment.ledger import closure
@@ -30,13 +31,15 @@ Watch = Callable[[str, Scenario], AbstractContextManager[Progress | None]]
 class AssessedRun:
     """A run, the same at half the step if that was asked for, its peak loads, and what it was held against.
 
-    `peaks` are empty for a run that failed: the peak until then is not the peak. `page` gives the report's HTML.
+    `approaches` say how near the clearance zone was come to; `peaks` are empty for a run that failed: the peak until
+    then is not the peak. `page` gives the report's HTML.
     """
 
     result: Run
     half_step: Run | None
     peaks: tuple[PeakLoad, ...]
     criteria: tuple[Criterion, ...]
+    approaches: tuple[Approach, ...] = ()
     page: Callable[[AssessedRun], str] | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -157,12 +160,14 @@ def assessed(
         with nullcontext() if watch is None else watch("again at half the step", scenario) as show:
             again = simulate.run(finer, progress=show)
     finished = again if again is not None and again.status == "done" else None
-    rows = criteria(done)
+    near = approaches(done) if done.status == "done" else ()
+    rows = criteria(done, near)
     return AssessedRun(
         result=done,
         half_step=again,
         # what a run that broke off reached is in its channels; a peak of it would pass for the peak
         peaks=peak_loads(done, finished) if done.status == "done" else (),
         criteria=with_half_step(rows, criteria(finished)) if rows and finished is not None else rows,
+        approaches=near,
         page=page,
     )

@@ -34,8 +34,11 @@ RATIO_IN_WORDS = (
 )
 
 
-def criteria(run: Run) -> tuple[Criterion, ...]:
-    """All that a finished run can be held against, by the scenario's `loads.standards`; nothing for a bare striker."""
+def criteria(run: Run, near: Sequence[Approach] | None = None) -> tuple[Criterion, ...]:
+    """All that a finished run can be held against, by the scenario's `loads.standards`; nothing for a bare striker.
+
+    `near` are its `approaches`, where they have been worked out.
+    """
     vehicle, begin = run.scenario.vehicle, run.scenario.initiation
     if not isinstance(vehicle, Vehicle) or run.status == "failed":
         return ()
@@ -45,13 +48,15 @@ def criteria(run: Run) -> tuple[Criterion, ...]:
         return tuple(virtual_tests.tilt(run, begin, asked))
     if vehicle.rops is None:
         return ()
+    if near is None:
+        near = approaches(run)
     if isinstance(begin, (StaticTest, PendulumBlow)):
-        structure = next((approach for approach in approaches(run) if approach.what == "structure"), None)
+        structure = next((approach for approach in near if approach.what == "structure"), None)
         zone = [] if structure is None else [_zone(structure)]
         if isinstance(begin, StaticTest):
             return (*virtual_tests.static_test(run, sequence(vehicle, begin), asked, structure), *zone)
         return (*virtual_tests.blow(run, begin, asked), *zone)
-    rows = [_zone(approach) for approach in approaches(run)]
+    rows = [_zone(approach) for approach in near]
     rows += [row for requirement in _once(run, asked) if (row := _compared(run, requirement)) is not None]
     share = rops_share(run) if isinstance(begin, (TipOver, Standing, Driving)) else None
     return (*rows, *([] if share is None else [_share(share)]))

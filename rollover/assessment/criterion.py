@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 from rollover.spec.standards.requirement import Requirement
 
@@ -40,6 +40,11 @@ class Criterion:
     def half_step_in_words(self) -> str:
         """By how much half the step changes the simulated value; empty if not examined."""
         return _half_step_in_words(self)
+
+
+def read(row: Mapping[str, Any]) -> Criterion:
+    """The criterion of a row that a results file holds."""
+    return Criterion(**{**row, "requirement": Requirement(**row["requirement"])})
 
 
 def compared(requirement: Requirement, simulated: float, note: str) -> Criterion:

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from rollover.dynamics.equilibrium import TOLERANCE
 from rollover.dynamics.result import Run
+from rollover.spec.vehicle import Striker, Vehicle
 
 LIMIT = 0.005  # a load goes with the root of an energy at most linearly: 0.5 % of it is 0.25 to 0.5 % of a load
 
@@ -18,7 +20,8 @@ LIMIT = 0.005  # a load goes with the root of an energy at most linearly: 0.5 % 
 class Closure:
     """Shares of the energy released: the largest residual at any time, `at` (s), and that at the end; `step` in s.
 
-    Not a number where nothing was released or no ledger was kept.
+    Not a number where no ledger was kept, and where what was released is no more than the numbers' own error: see
+    `resolution`.
     """
 
     largest: float
@@ -57,11 +60,29 @@ def closure(run: Run) -> Closure:
     step = run.scenario.simulation.step
     if not run.released > 0.0 or "energy/residual" not in run.recording.channels:
         return Closure(largest=math.nan, at=math.nan, end=math.nan, step=step)
-    share = np.abs(run.recording["energy/residual"]) / run.released
-    if not np.isfinite(share).any():
+    left = np.abs(run.recording["energy/residual"])
+    share = left / run.released
+    is_resolved = LIMIT * run.released > (least := resolution(run)) or float(np.nanmax(left, initial=0.0)) > least
+    if not is_resolved or not np.isfinite(share).any():
         return Closure(largest=math.nan, at=math.nan, end=math.nan, step=step)
     k = int(np.nanargmax(np.where(np.isfinite(share), share, np.nan)))
     return Closure(largest=float(share[k]), at=float(run.recording.time[k]), end=float(share[-1]), step=step)
+
+
+def resolution(run: Run) -> float:
+    """Energy below which the ledger of a run tells nothing, J.
+
+    A vehicle begins in balance to `TOLERANCE` of its weight W, on tyres of K in all that W presses in by W/K: of the
+    work W^2/K of that way a share of `TOLERANCE` is open. What has weight is lifted in numbers of 53 bits: W z is
+    rounded to eps of it in each step.
+    """
+    vehicle, simulation = run.scenario.vehicle, run.scenario.simulation
+    weight = run.scenario.gravity * (vehicle.mass if isinstance(vehicle, Striker) else vehicle.whole.mass)
+    height = max((float(np.abs(motion.origin[:, 2]).max()) for motion in run.pose.values()), default=0.0)
+    rounded = np.finfo(float).eps * weight * height * (simulation.duration / simulation.step)
+    wheels = vehicle.wheels if isinstance(vehicle, Vehicle) else ()
+    stiffness = sum(w.tyre.vertical_stiffness for w in wheels)
+    return float(rounded + (TOLERANCE * weight**2 / stiffness if wheels else 0.0))
 
 
 def of_cases(ledger: Mapping[str, Any]) -> str:

@@ -13,7 +13,7 @@ from ground.drops import Drop, UnusableDrop, found_contact, rest_stiffness, with
 from ground.identify import Identified, LawMass, identify, stiffness
 from ground.law import GroundLaw
 from ground.penetration import Fitted, chosen, fit_forms, law
-from rollover.comparison.onset import UntoldError, timed
+from rollover.comparison.onset import UnknownOnsetError, timed
 from rollover.recording import Recording
 from rollover.recording.time_stamps import Zero, from_first
 from rollover.scenario import Scenario
@@ -57,7 +57,7 @@ def settled(recordings: Mapping[str, Recording], scenario: Scenario) -> Settled:
             continue
         try:
             one = timed(name, recording, scenario.replaced(recording.conditions, origin=name))
-        except UntoldError as reason:
+        except UnknownOnsetError as reason:
             refused.append(str(reason))
             continue
         found[name] = one.recording

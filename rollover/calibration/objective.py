@@ -244,12 +244,12 @@ class Objective:
         simulated = case.seen(under, self.simulate(under))
         smooth = [alignment.smooth(signal, simulated) for signal in case.signals]
         worth = self.correlation[k] if self.correlation else (1.0,) * len(case.signals)
-        doubts = [alignment.doubt(v) for v in smooth]
+        interpolation_errors = [alignment.interpolation_error(v) for v in smooth]
         width = self.width(case)
 
         def at(late: float) -> list[Array]:
             found = []
-            for s, v, d, sigma, tau in zip(case.signals, smooth, doubts, case.sigmas, worth, strict=True):
+            for s, v, d, sigma, tau in zip(case.signals, smooth, interpolation_errors, case.sigmas, worth, strict=True):
                 # a sample beside a jump says as little as the time of the jump is known
                 size = np.hypot(sigma, alignment.at_stamps(s, simulated.time, d, late=late))
                 away = s.values - alignment.at_stamps(s, simulated.time, v, late=late)

@@ -102,7 +102,7 @@ def at_stamps(signal: Signal, time: Array, values: Array, *, late: float = 0.0) 
     return np.interp(signal.time - late, time, values)
 
 
-def doubt(values: Array) -> Array:
+def interpolation_error(values: Array) -> Array:
     """How far interpolation between rows of a simulation may be off, (m,): the largest second difference nearby.
 
     Nothing where it is smooth, the whole jump where it jumps, as an acceleration does when the ground is touched:

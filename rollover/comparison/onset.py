@@ -55,7 +55,7 @@ AT_ONCE = 1_000_000  # samples times zeros, 8 MB an array
 FINE = 2.5e-4  # s, between rows of a fall that onsets are looked up in
 
 
-class UntoldError(InputError):
+class UnknownOnsetError(InputError):
     """A clock without a zero that nothing in the recording tells."""
 
 
@@ -78,7 +78,7 @@ def timed(
     """
     simulate = simulate or simulated
     apart = is_apart(recording, scenario)
-    why = _doubt(recording.clock, apart)
+    why = _why_uncertain(recording.clock, apart)
     if why is None and (trusting or not isinstance(scenario.initiation, Drop)):
         return Timed(recording=recording)
     if why is None and not isinstance(scenario.vehicle, Striker):
@@ -93,7 +93,7 @@ def timed(
         found = by_alignment(bare, scenario, simulate)
     if found is None:
         if is_lost:
-            raise UntoldError(Fault(file=name, path="clock", message=_nothing_tells(recording, *_span(scenario))))
+            raise UnknownOnsetError(Fault(file=name, path="clock", message=_nothing_tells(recording, *_span(scenario))))
         return Timed(recording=recording)
     at, sigma, by, channels = found
     sigma = float(np.hypot(sigma, rounding(recording.time)))
@@ -113,7 +113,7 @@ def simulated(scenario: Scenario) -> Recording:
     return run(scenario).recording
 
 
-def _doubt(clock: Clock, apart: bool) -> Literal["unknown", "within", "apart"] | None:
+def _why_uncertain(clock: Clock, apart: bool) -> Literal["unknown", "within", "apart"] | None:
     if clock.zero == "unknown":
         return "unknown"
     if apart:

@@ -35,8 +35,8 @@ from rollover.diagnosis.selection.decision import (
     Explanation,
     by_first_effect,
     explained,
+    explains_little,
     redundant_effects,
-    takes_little,
     verdict_on,
 )
 from rollover.diagnosis.settings import SETTINGS
@@ -76,7 +76,7 @@ class Conclusion:
     """What recordings say: the explanation, its verdict and grade, and what it was drawn from.
 
     `tried` is the explanation before what does not explain was refused, `slight` are effects of no consequence, `shown`
-    is what recordings show by themselves, `kept` are those that were held out, `groups` what is left out in turn.
+    is what recordings show by themselves, `validation` are those that were held out, `groups` what is left out in turn.
     """
 
     asked: Asked
@@ -88,7 +88,7 @@ class Conclusion:
     effects: tuple[Named, ...]
     slight: tuple[Named, ...]
     shown: RecordingFault | None
-    kept: tuple[Dataset, ...]
+    validation: tuple[Dataset, ...]
     groups: Groups
     candidates: Sequence[Candidate]
     acts: str
@@ -112,13 +112,13 @@ def concluded(
     assert scenario is not None
     notes = [*notes, *(inconsistency.says() for inconsistency in inconsistencies)]
     found = weighted_datasets(scenario, [e for e in every if e.name not in hold_out])
-    kept = [e for e in weighted_datasets(scenario, every) if e.name in hold_out] if hold_out else []
+    validation = [e for e in weighted_datasets(scenario, every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < TUNING.least_samples:
         return cannot_tell(every, names, notes, began, inconsistency_evidence(inconsistencies))
     notes += [*truncation_notes(every, found), *zero_notes(found)]
     groups = left_out(found)
     notes += inconsistent_repeats(found)
-    is_cross_validated = len(groups) > 1 or bool(kept)
+    is_cross_validated = len(groups) > 1 or bool(validation)
     if not is_cross_validated:
         notes.append("one condition only: what stands as held out is predicted by the fit to it")
     problem = Problem(found)
@@ -138,7 +138,7 @@ def concluded(
         asked,
         inquiry,
         base,
-        kept,
+        validation,
         acts=acts,
         set_ups=set_ups,
         inconsistencies=inconsistencies,
@@ -150,7 +150,7 @@ def weighed(
     asked: Asked,
     inquiry: Inquiry,
     base: Fitted,
-    kept: Sequence[Dataset],
+    validation: Sequence[Dataset],
     *,
     acts: str,
     set_ups: tuple[Scenario, ...] = (),
@@ -159,7 +159,7 @@ def weighed(
 ) -> Conclusion:
     """What an inquiry comes to beside a base: an explanation, whether it is named, and how much of all it explains.
 
-    `kept` are recordings that were held out, `acts` what kind of test they are of.
+    `validation` are recordings that were held out, `acts` what kind of test they are of.
     """
     problem, groups, phases, recordings = inquiry.problem, inquiry.groups, inquiry.phases, asked.recordings
     found, notes = list(problem.dataset), list(notes)
@@ -178,7 +178,7 @@ def weighed(
 
     def name_all(found: Explanation, verdict: str) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
         alike = partial(alike_beside, problem, groups=groups) if is_beside else None
-        return _refitted_explanation(problem, found, verdict, kept, groups, phases, alike)
+        return _refitted_explanation(problem, found, verdict, validation, groups, phases, alike)
 
     explanation, verdict = decide(explanation)
     held, named_so = problem.dataset, name_all(explanation, verdict)
@@ -198,7 +198,7 @@ def weighed(
         problem.with_noise_model(held)
         explanation, verdict = decide(next_best(problem, explanation, nothing, groups, phases))
         named_so = name_all(explanation, verdict)
-    explanation, effects, kept = named_so
+    explanation, effects, validation = named_so
     effects = clear_of_null(problem, explanation, effects) if asked.estimates else effects
     found = list(problem.dataset)
     # beside a discrepancy what is met is no more than that and noise: what is surely predicted all the same is more
@@ -217,11 +217,11 @@ def weighed(
         shown = intrinsic_faults(found, recordings, phases, explanation.p_value) or misread(
             inconsistencies, len(found), explanation.p_value
         )
-    elif effects and takes_little(explanation, groups, TUNING.main_share):
+    elif effects and explains_little(explanation, groups, TUNING.main_share):
         # what is lost again and again is met by no effect, and bends those that are fitted to it
         shown = truncation_fault(found, recordings, phases, explanation.p_value)
         if shown is not None and not (
-            takes_little(explanation, groups) or shown.is_covered_by(e.channel for e in effects)
+            explains_little(explanation, groups) or shown.is_covered_by(e.channel for e in effects)
         ):
             shown = None  # what another channel loses is no reason to doubt them
     if shown is not None:
@@ -237,12 +237,12 @@ def weighed(
         effects=effects,
         slight=slight,
         shown=shown,
-        kept=tuple(kept),
+        validation=tuple(validation),
         groups=groups,
         candidates=inquiry.candidates,
         acts=acts,
         set_ups=set_ups,
-        is_cross_validated=len(groups) > 1 or bool(kept),
+        is_cross_validated=len(groups) > 1 or bool(validation),
         inconsistencies=tuple(inconsistencies),
         notes=tuple(notes),
     )
@@ -252,23 +252,33 @@ def _refitted_explanation(
     problem: Problem,
     explanation: Explanation,
     verdict: str,
-    kept: Sequence[Dataset],
+    validation: Sequence[Dataset],
     groups: Sequence[Sequence[int]],
     phases: Sequence[Sequence[tuple[float, str]]],
     alike: Callable[[Step], Sequence[Fitted]] | None,
 ) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
-    """An explanation eased beside its effects, these with their numbers if the verdict names any, and the kept ones."""
-    whole, kept = marginalised_at_fit(problem, explanation, kept, phases)
-    return whole, named(problem, whole, groups, alike) if verdict in NAMING else (), kept
+    """An explanation with uncertain conditions at its fit, its effects with their numbers if the verdict names any.
+
+    Also the recordings for validation, under those conditions.
+    """
+    whole, validation = marginalised_at_fit(problem, explanation, validation, phases)
+    return whole, named(problem, whole, groups, alike) if verdict in NAMING else (), validation
 
 
 def marginalised_at_fit(
-    problem: Problem, explanation: Explanation, kept: Sequence[Dataset], phases: Sequence[Sequence[tuple[float, str]]]
+    problem: Problem,
+    explanation: Explanation,
+    validation: Sequence[Dataset],
+    phases: Sequence[Sequence[tuple[float, str]]],
 ) -> tuple[Explanation, list[Dataset]]:
-    """The explanation fitted again with what the conditions leave uncertain as it acts beside it; kept ones too."""
+    """The explanation fitted again with what the conditions leave uncertain as it acts beside it.
+
+    Also the recordings for validation, under those conditions.
+    """
     if not explanation.parts or not has_uncertain_conditions(problem):
-        return explanation, list(kept)
+        return explanation, list(validation)
     fitted = refitted_with_conditions(problem, explanation.fitted)
     beside = problem.changes(fitted.candidates, fitted.x)
     after = mismatch_of(problem.dataset, fitted.blocks, phases)
-    return replace(explanation, fitted=fitted, after=after), [with_uncertain_conditions_at(e, beside) for e in kept]
+    uncertain = [with_uncertain_conditions_at(e, beside) for e in validation]
+    return replace(explanation, fitted=fitted, after=after), uncertain

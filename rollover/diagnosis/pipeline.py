@@ -160,11 +160,13 @@ def _beside_estimated_discrepancy(
             )
     if isinstance(other, Diagnosis):
         return None
-    is_told = bool(other.effects) or (other.verdict == "no-mismatch" and learned.is_usual and not _is_lawful(other))
+    is_told = bool(other.effects) or (
+        other.verdict == "no-mismatch" and learned.is_usual and not _has_residual_law(other)
+    )
     return reported(other) if is_told else None
 
 
-def _is_lawful(found: Conclusion) -> bool:
+def _has_residual_law(found: Conclusion) -> bool:
     """Whether what nothing explains follows a law that carries over to recordings that were held out."""
     problem, scenario = found.problem, found.asked.scenario
     if scenario is None:

@@ -40,7 +40,7 @@ def prepared(
         runs = full_runs(simulator)
         if runs is not None:
             runs.children = executor.children
-        simulator.settle()
+        simulator.choose_medoid()
         notes += [f"{name}: {line}" for line in spiked]
         one = dataset_of(name, thin, simulator, averaged)
         still = [c for c, v in recording.channels.items() if np.isfinite(v).any() and np.nanmin(v) == np.nanmax(v)]

@@ -72,7 +72,7 @@ def reported(c: Conclusion) -> Diagnosis:
     contrary = inconsistent_repeats(found, SETTINGS.data.repeatability.contradiction)
     if verdict == "no-mismatch" and not c.slight and (contrary or is_weak(detectable)):
         verdict = "cannot-tell"
-    h_before, h_after = (judged(problem, f, c.kept, groups) for f in (explanation.base, explanation.fitted))
+    h_before, h_after = (judged(problem, f, c.validation, groups) for f in (explanation.base, explanation.fitted))
     early = (
         misfit_before_impact(problem.dataset, explanation.base),
         misfit_before_impact(problem.dataset, explanation.fitted),
@@ -131,7 +131,7 @@ def reported(c: Conclusion) -> Diagnosis:
         degrees=degrees if is_mismatch else (),
         smallest_detectable=detectable,
         training=training,
-        held_out=tuple(e.name for e in c.kept) or training,
+        held_out=tuple(e.name for e in c.validation) or training,
         before=h_before.scores,
         after=h_after.scores,
         per_recording=tuple(
@@ -141,7 +141,7 @@ def reported(c: Conclusion) -> Diagnosis:
         simulations=problem.simulations,
         seconds=clock.perf_counter() - asked.began,
         notes=tuple(notes),
-        grids=_grids([*found, *c.kept]),
+        grids=_grids([*found, *c.validation]),
         empirical=law,
         answer=answer_of(
             verdict, c.grade, explanation.p_value, slight=bool(c.slight), is_beside=asked.discrepancy is not None

@@ -11,9 +11,9 @@ from rollover.recording.pairs import (
     write_pairs,
     write_table,
 )
-from rollover.recording.record import Clock, Doubt, Recording, Sensor
+from rollover.recording.record import Clock, Recording, Sensor, StandardUncertainty
 from rollover.recording.runs import FORMAT, arrow_table, data_frame, is_run, read_parquet, write_parquet
 
-__all__ = ["FORMAT", "Clock", "Doubt", "Recording", "Sensor", "UnreadableError", "as_numbers", "is_run"]
+__all__ = ["FORMAT", "Clock", "Recording", "Sensor", "StandardUncertainty", "UnreadableError", "as_numbers", "is_run"]
 __all__ += ["arrow_table", "data_frame", "put_text", "read_pairs", "read_parquet", "read_table"]
 __all__ += ["write_pairs", "write_parquet", "write_table"]

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 Point = tuple[float, float, float]
 CFC = Literal[60, 180, 600, 1000]  # channel filter classes
 CLASSES: tuple[int, ...] = get_args(CFC)
-Doubt = float | tuple[float, ...]  # 1 sigma of a value, or of each number of a list
+StandardUncertainty = float | tuple[float, ...]  # 1 sigma of a value, or of each number of a list
 
 
 @parameters
@@ -79,7 +79,7 @@ class Recording:
     channels: Mapping[str, Array]
     source: str = ""
     conditions: Mapping[str, Any] = field(default_factory=dict)
-    uncertainty: Mapping[str, Doubt] = field(default_factory=dict)
+    uncertainty: Mapping[str, StandardUncertainty] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     cfc: Mapping[str, int] = field(default_factory=dict)
     clock: Clock = field(default_factory=Clock)

@@ -167,7 +167,7 @@ def excluded(folder: Path) -> dict[str, str]:
     return {e.name: e.reason for e in found.scenarios}
 
 
-def strangers(folder: Path) -> list[Answer]:
+def without_scenario(folder: Path) -> list[Answer]:
     """Baselines and exclusions of a folder that belong to no scenario, or to one that has both."""
     known = [p.stem for p in sorted(folder.glob("*.yaml"))]
     kept = [p.stem for p in sorted((folder / FOLDER).glob("*.yaml")) if p.name != EXCLUDED]
@@ -253,7 +253,7 @@ def _difference(was: Load | None, now: Spread | None, largest: Mapping[str, floa
     )
 
 
-def drawn_up(
+def baseline_from(
     name: str,
     scenario: Scenario,
     ensemble: Sequence[Sequence[Extreme]],

@@ -157,10 +157,10 @@ def _head(ready: Prepared, status: str) -> dict[str, Any]:
 
 def _reference(chosen: Study, target: Path, way: Way, watch: Watch, done: Conducted) -> dict[str, Any] | None:
     """Some cases once more by Exudyn, through the same store."""
-    if not reference.chosen(chosen, done):
+    if not (at := reference.chosen(chosen, done)):
         return None
     with watch("cases by Exudyn") as show:
-        return reference.checked(chosen, target, way, done, lambda p: show(p.done, p.of, _note(p)))
+        return reference.checked(chosen, target, way, done, at, lambda p: show(p.done, p.of, _note(p)))
 
 
 def _integrators(chosen: Study, done: Conducted) -> str:

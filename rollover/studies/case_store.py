@@ -45,12 +45,12 @@ __all__ = [
     "claim",
     "compact",
     "keep",
-    "kept",
     "locked",
-    "on_shelf",
     "put_text",
     "read_plan",
     "row_of",
+    "stored",
+    "stored_keys",
     "write_plan",
 ]
 
@@ -178,7 +178,7 @@ def keep(folder: Path, row: Row) -> None:
     write_pairs(row.measures, about, path_of(folder, row.key))
 
 
-def kept(folder: Path, key: str) -> Row | None:
+def stored(folder: Path, key: str) -> Row | None:
     """Row of a case, None if there is none or its file is damaged: then it is run again."""
     try:
         measures, about = read_pairs(path_of(folder, key))
@@ -203,7 +203,7 @@ def kept(folder: Path, key: str) -> Row | None:
         return None
 
 
-def on_shelf(folder: Path) -> set[str]:
+def stored_keys(folder: Path) -> set[str]:
     """Keys of all cases that have a file."""
     found: set[str] = set()
     shelf = folder / CASES

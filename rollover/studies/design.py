@@ -120,7 +120,7 @@ def _read(path: Path, names: list[str]) -> dict[str, NDArray[Any]]:
         found = {}
         for name in names:
             words = read_words(path, [name])[name]
-            found[name] = np.array(words, dtype=object) if _wordy(words) else read_csv(path, [name])[name]
+            found[name] = np.array(words, dtype=object) if _are_words(words) else read_csv(path, [name])[name]
     count = len(found[names[0]])
     if count == 0:
         raise InputError(Fault(file=str(path), message="empty, got a table without rows"))
@@ -135,7 +135,7 @@ def _read(path: Path, names: list[str]) -> dict[str, NDArray[Any]]:
     return found
 
 
-def _wordy(words: list[str]) -> bool:
+def _are_words(words: list[str]) -> bool:
     """Whether a column holds words: no cell of it is a number."""
 
     def number(text: str) -> bool:

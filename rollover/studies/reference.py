@@ -32,16 +32,15 @@ def chosen(study: Study, done: Conducted) -> list[int]:
     return sorted(every[int(k)] for k in random.choice(len(every), count, replace=False))
 
 
-def checked(study: Study, folder: Path, way: Way, done: Conducted, show: Show | None = None) -> dict[str, Any] | None:
-    """Differences of the responses between both integrators; None where the loop made no case.
+def checked(
+    study: Study, folder: Path, way: Way, done: Conducted, at: Sequence[int], show: Show | None = None
+) -> dict[str, Any]:
+    """Differences of the responses between both integrators at some points, one at least.
 
     The runs by Exudyn are kept like all cases. A difference is relative to Exudyn's value, 0 where both are equal;
     cases of which only one integrator has a value are counted as `ended_otherwise`.
     """
-    at = chosen(study, done)
-    if not at:
-        return None
-    some = Points(columns={name: column[at] for name, column in done.points.columns.items()})
+    some = Points(columns={name: column[list(at)] for name, column in done.points.columns.items()})
     again = evaluate(Builder(study, integrator=REFERENCE), folder, way, some, show)
     before = [done.rows[k] for k in at]
     outputs, every = [], []
@@ -57,7 +56,7 @@ def checked(study: Study, folder: Path, way: Way, done: Conducted, show: Show | 
     return {
         "integrator": REFERENCE,
         "cases": len(at),
-        "points": at,
+        "points": list(at),
         "largest": max(every, default=None),
         "median": float(np.median(every)) if every else None,
         "ended_otherwise": sum(a.status != b.status for a, b in zip(before, again, strict=True)),

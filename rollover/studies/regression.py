@@ -84,7 +84,7 @@ def chosen(names: Sequence[str]) -> Chosen:
                     Fault(file=name, message="no scenario there; a folder with scenarios, .yaml files, is needed")
                 )
             files.update(dict.fromkeys(found))
-            answers += baselines.strangers(folder)
+            answers += baselines.without_scenario(folder)
         else:
             files[document.find(name)] = None
     stems = [f.stem for f in files]
@@ -194,7 +194,7 @@ def updated(
         before = baselines.read(path) if path.is_file() else None
         mine = [(o.case.half_step, o.value.extremes) for o in outcomes[file] if o.value is not None]
         plain, half_ = ([v for h, v in mine if h is finer] for finer in (False, True))
-        drawn = baselines.drawn_up(file.stem, scenario, plain, half_, reason, before)
+        drawn = baselines.baseline_from(file.stem, scenario, plain, half_, reason, before)
         if drawn is not before:
             new[path] = drawn
         answer = _written(drawn, before, scenario, plain, sum(o.wall_time for o in outcomes[file]))

@@ -150,13 +150,13 @@ def evaluate(builder: Builder, folder: Path, way: Way, found: Points, show: Show
 def _worked_off(
     builder: Builder, folder: Path, way: Way, keys: Sequence[str], found: Points, show: Show | None
 ) -> tuple[dict[str, Row], int]:
-    there = case_store.on_shelf(folder)
+    there = case_store.stored_keys(folder)
     rows: dict[str, Row] = {}
     todo: dict[str, int] = {}
     for k, key in enumerate(keys):
         if key in rows or key in todo:
             continue
-        row = case_store.kept(folder, key) if key in there else None
+        row = case_store.stored(folder, key) if key in there else None
         if row is None or (way.retry == "failed" and row.status == "failed"):
             todo[key] = k
         else:

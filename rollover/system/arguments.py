@@ -13,6 +13,7 @@ MOST_CLOCK = 1e3  # s: no recording of a rollover or a drop lasts so long, and n
 MOST_FORCE = 1e6  # N: the weight of 100 t, more than any striker's
 LONGEST = 1e7  # s: 116 days of wall time
 MOST_MEMORY = 1.4e14  # bytes: the 47 bits of address space that a process has
+SEGMENTS = 12  # elements to a member of a frame: forces and energies within 0.5 % of four times as many (tested)
 
 
 def within(name: str, value: float, least: float, most: float = inf) -> None:

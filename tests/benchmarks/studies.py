@@ -142,7 +142,7 @@ def rows(count: int, folder: Path) -> dict[str, float]:
     builder.key(done.points.row(0))
     step("key", lambda: [builder.key(done.points.row(k)) for k in range(count)])
     step("keep", lambda: [case_store.keep(folder, row) for row in full])
-    step("read", lambda: [case_store.kept(folder, row.key) for row in full])
+    step("read", lambda: [case_store.stored(folder, row.key) for row in full])
     step("table", lambda: case_store.compact(folder, study, done.keys, done.points.columns, full))
     again = Conducted(points=done.points, keys=done.keys, rows=full, ran=count)
     account = step("answers", lambda: answers(study, again))

@@ -16,14 +16,14 @@ from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise.ensemble import (
     HeavyTail,
     gained,
+    has_diverged,
     heavy_tail,
     leave_one_out_neighbours,
     memory,
-    neighbours_on_same_course,
-    p_value_of_other_courses,
+    p_value_of_divergence,
     shares,
-    took_other_course,
     with_sample_weights,
+    without_diverged,
 )
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
@@ -199,7 +199,7 @@ def test_another_course_counts_as_one_state_of_unknown_size() -> None:
         expected + beyond
     )
     assert found.share == pytest.approx(share, rel=1e-12)
-    assert took_other_course(found)
+    assert has_diverged(found)
 
 
 def test_no_more_is_forgiven_than_there_is() -> None:
@@ -255,7 +255,7 @@ def test_a_course_like_the_neighbours_counts_in_full() -> None:
     e = blown()
     found = heavy_tail(e, misfit(e, [0.7] * 4))
     assert found is None
-    assert not took_other_course(found)
+    assert not has_diverged(found)
 
 
 def test_what_one_channel_leaves_alone_is_not_forgiven() -> None:
@@ -365,7 +365,7 @@ def test_one_recording_may_diverge_but_not_all_of_them() -> None:
     assert of_courses(0) > 0.05
     assert of_courses(1) > 0.05
     assert of_courses(1) != pytest.approx(
-        p_value_of_other_courses(1, 4)
+        p_value_of_divergence(1, 4)
     )  # so few tell nothing: a p-value of whole numbers is none
     assert of_courses(4) < 1e-3
 
@@ -375,9 +375,9 @@ def test_a_neighbour_on_another_course_is_none() -> None:
     t = e.recording.time
     late = np.where(t > 0.6, np.sin(40.0 * t), 0.0)
     perturbed = [{CHANNEL: a * late} for a in (0.3, -0.2, 0.25, 4.0, -0.3)]
-    assert [d[CHANNEL].max() < 1.0 for d in neighbours_on_same_course(e, perturbed, 0.5)] == [True] * 4
+    assert [d[CHANNEL].max() < 1.0 for d in without_diverged(e, perturbed, 0.5)] == [True] * 4
     early = [{CHANNEL: a * np.where(t < 0.4, 1.0, 0.0)} for a in (0.3, 4.0)]
-    assert len(neighbours_on_same_course(e, early, 0.5)) == 2  # before the impact there are no courses
+    assert len(without_diverged(e, early, 0.5)) == 2  # before the impact there are no courses
     simulator: Any = Blown(0.5)
     found = with_sample_weights(replace(e, simulator=simulator), perturbed)
     assert found.first_impact == 0.5

@@ -108,7 +108,7 @@ def test_near_noise_slopes_suggest_pairs_but_no_any_curve(monkeypatch: pytest.Mo
     object.__setattr__(asking, "say", lambda _: None)
     object.__setattr__(asking, "candidates", [MASS, DAMPING, NOSE])
     monkeypatch.setattr(pairs, "_with_thresholds_scanned", lambda *_: [])
-    monkeypatch.setattr(pairs, "_takes_little", lambda *_: True)
+    monkeypatch.setattr(pairs, "_explains_little", lambda *_: True)
     for far in (False, True):
         asked.clear()
         monkeypatch.setattr(pairs, "is_far", lambda *_, far=far: far)

@@ -138,7 +138,7 @@ def test_what_takes_little_where_channels_break_off_is_not_named(
 
     A gain of the channel that breaks off must take more than half of it, of another one more than a tenth.
     """
-    monkeypatch.setattr(diagnosing, "takes_little", lambda _, __, share=0.1: taken < share)
+    monkeypatch.setattr(diagnosing, "explains_little", lambda _, __, share=0.1: taken < share)
     recordings = recorded({"effects.sensor-gain.gain": 1.05}, 3, noise=0.003, rate=600.0)
     name, first = recordings[0]
     holed = first.channels[broken].copy()

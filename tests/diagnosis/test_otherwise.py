@@ -19,7 +19,7 @@ from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.forward_step import _restarted_from_base
-from rollover.diagnosis.selection.restarts import begun_otherwise, with_common_time_shifts
+from rollover.diagnosis.selection.restarts import from_other_starts, with_common_time_shifts
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far, screen
 from rollover.diagnosis.settings import SETTINGS
@@ -57,7 +57,7 @@ def begun(promised: float, gained: float) -> list[str]:
         starts={"soil-adhesion": ((0.7,),)},
     )  # fmt: skip
     met = sorted([fitted(PLAIN, 10.0), fitted(SHAPED, gained)], key=lambda f: f.left)
-    assert begun_otherwise(cast(Inquiry, inquiry), base, met, looked, (0.0, 0.0)) == met
+    assert from_other_starts(cast(Inquiry, inquiry), base, met, looked, (0.0, 0.0)) == met
     return asked
 
 
@@ -111,7 +111,7 @@ def test_the_best_oscillatory_effect_is_scanned_in_frequency(score: float, combe
         free=lambda _: [PLAIN, rings], fits=fits, parallel_map=lambda look, things: [None] * len(things)
     )
     looked = ScoreTest(score=50.0, scores={"mass": 40.0, rings.key: score}, null=np.zeros(9), detectable={})
-    assert begun_otherwise(cast(Inquiry, inquiry), best, [best, astray], looked, (0.0, 0.0)) == [best, astray]
+    assert from_other_starts(cast(Inquiry, inquiry), best, [best, astray], looked, (0.0, 0.0)) == [best, astray]
     assert asked == ["polish structural-compliance", "time structural-compliance"] * combed
 
 

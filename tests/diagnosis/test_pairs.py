@@ -98,7 +98,7 @@ def test_all_oscillatory_pairs_are_fitted_with_their_share() -> None:
         fitted((replace(bent, id="soil-layer"), bent), 20.0),
     ]
     far = fitted((replace(MASS, id="soil-stiffness"), NOSE), 100.0)
-    found = pairs._in_tune(inquiry(asked), [*whole, far])
+    found = pairs._with_secondary_fitted(inquiry(asked), [*whole, far])
     assert [(j.how, [c.id for c in j.candidates]) for j in asked] == [
         ("shape", ["mass", "structural-compliance"]),
         ("shape", ["soil-viscous-damping", "structural-compliance"]),
@@ -133,18 +133,18 @@ def test_best_pairs_are_scanned_fully_until_noise_is_left(
 
 
 @pytest.mark.parametrize(
-    ("alone", "pair", "takes_little"),
+    ("alone", "pair", "explains_little"),
     [
         (21.0, 19.5, True),  # 1.5 of 20 times what chance leaves
         (21.0, 18.95, False),
         (1.6, 1.59, False),  # not much is left: what takes all of it may not be met yet
     ],
 )
-def test_a_pair_that_gains_next_to_nothing_is_dropped(alone: float, pair: float, takes_little: bool) -> None:
+def test_a_pair_that_gains_next_to_nothing_is_dropped(alone: float, pair: float, explains_little: bool) -> None:
     lead, both = leaving((DAMPING,), alone), leaving((DAMPING, MASS), pair)
-    assert pairs._takes_little(lead, both, (0, 1)) is takes_little
+    assert pairs._explains_little(lead, both, (0, 1)) is explains_little
     # of few recordings the pair was fitted to these alone
-    assert pairs._takes_little(lead, replace(both, blocks=both.blocks[:1]), (1,)) is takes_little
+    assert pairs._explains_little(lead, replace(both, blocks=both.blocks[:1]), (1,)) is explains_little
 
 
 def leaving(candidates: tuple[Candidate, ...], times: float) -> Fitted:

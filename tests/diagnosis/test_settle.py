@@ -56,7 +56,7 @@ def a_toss(monkeypatch: pytest.MonkeyPatch, off: Mapping[tuple[float, ...], floa
 def test_the_run_that_is_like_most_others_stands_for_all(monkeypatch: pytest.MonkeyPatch) -> None:
     own = shipped("cube_toss").ground.elements.centre
     simulator = a_toss(monkeypatch, {own: 4.0})  # where the scenario has its grid the run goes the other way
-    simulator.settle()
+    simulator.choose_medoid()
     chosen = simulator.scenario.ground.elements.centre
     assert chosen != own
     made = simulator.runs
@@ -73,14 +73,14 @@ def test_the_run_that_is_like_most_others_stands_for_all(monkeypatch: pytest.Mon
 def test_a_run_like_the_others_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     own = shipped("cube_toss").ground.elements.centre
     simulator = a_toss(monkeypatch, {own: 0.055})
-    simulator.settle()
+    simulator.choose_medoid()
     assert simulator.scenario.ground.elements.centre == own
 
 
 def test_phases_are_those_of_the_run_that_stands_for_all() -> None:
     made = Recording(title="toss", time=np.arange(0.0, 0.4, 0.01), channels={"chassis/position_z": np.zeros(40)})
     simulator = RunSimulator(shipped("cube_toss"), made)
-    simulator.settle()
+    simulator.choose_medoid()
     runs = simulator.runs
     marks = simulator.marks()
     assert [name for _, name in marks][:2] == ["approach", "impact"]

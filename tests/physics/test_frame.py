@@ -229,7 +229,7 @@ def test_members_meet_where_they_touch() -> None:
 
 def test_the_number_of_segments_converges() -> None:
     """Force and energy at a given way, side and rear: the default of 12 lies within 0.5 % of 48."""
-    from rollover.assessment.frame_test import SEGMENTS
+    from rollover.system.arguments import SEGMENTS
 
     high, wide = 1.6, 1.1
     beams = portal(high, wide, TUBE, MILD)

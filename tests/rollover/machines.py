@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import os
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -167,11 +166,6 @@ def once(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
             return known[0]
 
         monkeypatch.setattr(name, call)
-
-
-def other_process(words: list[object]) -> subprocess.CompletedProcess[str]:
-    line = [sys.executable, "-m", "tests.rollover.command", *map(str, words)]
-    return subprocess.run(line, capture_output=True, text=True, timeout=300)
 
 
 class Killed(BaseException):

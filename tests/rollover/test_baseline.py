@@ -13,7 +13,7 @@ from rollover.scenario import load
 from rollover.spec import document
 from rollover.studies import baseline as baselines
 from rollover.studies import regression
-from rollover.studies.baseline import Baseline, Load, against, allowed, drawn_up
+from rollover.studies.baseline import Baseline, Load, against, allowed, baseline_from
 from rollover.studies.ensemble import Extreme, Spread, neighbours
 from rollover.system.errors import InputError
 
@@ -35,7 +35,7 @@ FINER = [start(1.002 * e[0].value) for e in SMOOTH]
 
 def drawn(ensemble: list[tuple[Extreme, ...]], before: Baseline | None = None, reason: str = "first") -> Baseline:
     finer = [start(1.002 * e[0].value) for e in ensemble]
-    return drawn_up("drop_test", SCENARIO, ensemble, finer, reason, before)
+    return baseline_from("drop_test", SCENARIO, ensemble, finer, reason, before)
 
 
 def test_smooth_loads_need_one_start_and_hold_to_half_step() -> None:
@@ -121,7 +121,7 @@ def test_a_manual_tolerance_lasts_until_it_is_too_small() -> None:
     assert again.loads[0].reason == "the customer's criterion"
     rough = [start(1.06 * e[0].value) for e in later]
     with pytest.raises(InputError, match=r"baselines/drop_test\.yaml: tolerance: below the discretisation error"):
-        drawn_up("drop_test", SCENARIO, later, rough, "x", kept)
+        baseline_from("drop_test", SCENARIO, later, rough, "x", kept)
 
 
 def test_history_grows_by_what_changed_and_by_nothing_else(tmp_path: Path) -> None:

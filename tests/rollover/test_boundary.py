@@ -356,7 +356,7 @@ def test_a_case_that_somebody_else_wrote_is_run_again(tmp_path: Path) -> None:
     )
     shelf.keep(tmp_path, row)
     path = shelf.path_of(tmp_path, key)
-    assert shelf.kept(tmp_path, key) == row
+    assert shelf.stored(tmp_path, key) == row
     table = pq.read_table(path)
     about = json.loads(table.schema.metadata[b"rollover"])
     others = [table.set_column(0, "name", pa.array([3])), table.set_column(1, "value", pa.array(["x"]))]
@@ -371,4 +371,4 @@ def test_a_case_that_somebody_else_wrote_is_run_again(tmp_path: Path) -> None:
     others += [table.replace_schema_metadata({"rollover": json.dumps(each)}) for each in told]
     for other in others:
         pq.write_table(other, path)
-        assert shelf.kept(tmp_path, key) is None
+        assert shelf.stored(tmp_path, key) is None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import string
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ground.compiled import KEPT
 from ground.quantity import quantities
 from rollover.dynamics.drop_test import DropModel, simulate_drop
 from rollover.dynamics.simulate import run
@@ -24,6 +26,7 @@ from rollover.scenario import Scenario
 from rollover.spec.channels import is_known
 from rollover.system.errors import InputError
 from tests.physics.scenes import shipped
+from tests.rollover import forked
 
 # ids and parameters that users and recordings rely on
 PROMISED: dict[str, set[str]] = {
@@ -218,6 +221,8 @@ def test_a_wrong_effect_is_one_line_with_the_nearest() -> None:
 def outside(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
     """A process of its own: an effect once defined stays in the table of its process."""
     root = Path(__file__).parents[2]
+    if arguments[:2] == ("-m", forked.COMMAND) and not variables:
+        return forked.command(*arguments[2:], cwd=root)
     path = os.pathsep.join([str(root), os.environ.get("PYTHONPATH", "")])
     env = {**os.environ, "PYTHONPATH": path, **variables}
     return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, env=env, cwd=root, check=False)
@@ -264,6 +269,7 @@ def test_the_command_line_takes_a_file_of_effects(tmp_path: Path) -> None:
 def test_a_file_of_effects_imports_under_its_own_name(tmp_path: Path) -> None:
     """Its machine code is kept for each name that it is loaded under."""
     (tmp_path / "mine.py").write_text(OWN.read_text(encoding="utf-8"), encoding="utf-8")
+    shutil.copytree(KEPT, tmp_path / "kept")  # all but that file's own is compiled already
     kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
     by_name = ["-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import mine; print(mine.SoilRoots.id)"]
     by_path = ["-c", "from rollover.effects import effects; print(list(effects())[-1])"]

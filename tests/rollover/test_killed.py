@@ -15,13 +15,13 @@ from rollover.recording import Recording
 from rollover.recording.importers import read_recording, write_recording
 from rollover.system import writing
 from rollover.system.errors import InputError
+from tests.rollover import forked
 from tests.rollover.disks import Disk
 from tests.rollover.machines import (
     WRONG,
     Killed,
     commands,
     killed,
-    other_process,
     posix,
     recorded,
     tree,
@@ -37,15 +37,15 @@ def test_a_second_start_is_told_of_the_first(name: str, tmp_path: Path) -> None:
         from rollover.studies import case_store
 
         with case_store.locked(target):
-            result = other_process(words)
+            result = forked.command(*words)
     else:
         with writing.working():
             writing.hold(target)
-            result = other_process(words)
+            result = forked.command(*words)
     assert result.returncode == WRONG, result.stderr
     assert "by another process" in result.stderr
     assert len(result.stderr.splitlines()) == 1
-    assert other_process(words).returncode == 0, "once the first has ended, it goes"
+    assert forked.command(*words).returncode == 0, "once the first has ended, it goes"
 
 
 @posix

@@ -7,6 +7,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -15,8 +16,11 @@ from rollover.assessment.ledger import closure
 from rollover.cli import console
 from rollover.cli.commands.study import sentences
 from rollover.cli.main import app
+from rollover.dynamics import simulate
 from rollover.dynamics.result import Run
 from rollover.recording import Recording
+from rollover.scenario import load
+from rollover.spec.vehicle import Vehicle
 from rollover.studies.summary import answers
 from tests.rollover.studies import made_up
 from tests.viz.example import overturn
@@ -76,6 +80,41 @@ def test_without_energy_there_is_no_share(example: Run, tmp_path: Path, capsys: 
     numbers, terminal, _, _ = told(replace(example, released=0.0), tmp_path, capsys)
     assert numbers["largest_residual"] is None
     assert "nergy ledger" not in terminal
+
+
+@pytest.mark.parametrize(
+    ("left", "released", "most"),
+    [
+        (0.9, 1e-3, math.nan),  # 90,000 % of next to nothing, within what the start leaves open
+        (0.9, 199.0, math.nan),  # 0.5 % of what was released is not resolved either
+        (0.9, 201.0, 0.9 / 201.0),
+        (1.1, 1e-3, 1100.0),  # more than numbers can do: made of nothing
+    ],
+)
+def test_a_share_of_next_to_nothing_is_none(
+    left: float, released: float, most: float, example: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    vehicle = example.scenario.vehicle
+    assert isinstance(vehicle, Vehicle)
+    weight = vehicle.whole.mass * example.scenario.gravity
+    way = weight / sum(w.tyre.vertical_stiffness for w in vehicle.wheels)  # that the tyres are pressed in
+    least = 1e-7 * weight * way  # J: what a balance of 1e-7 leaves open; rounding is a thousandth of that here
+    run = widened(replace(example, released=released * least), left / released)
+    run = replace(run, ledger={**run.ledger, "residual": float(run.recording["energy/residual"][-1])})
+    numbers, terminal, page, recording = told(run, tmp_path, capsys)
+    assert numbers["largest_residual"] == (None if math.isnan(most) else pytest.approx(most))
+    for text in (terminal, page, recording):
+        assert ("does not close" in text) is (most > 0.005)
+    for text in (page, recording):
+        assert (" released" in text) is math.isfinite(most)
+
+
+def test_a_stand_that_has_not_moved_yet_has_no_share() -> None:
+    done = simulate.run(load("static_rops_test").replaced({"simulation.duration": 0.1}))
+    assert 0.0 < done.released < 1e-6
+    assert np.abs(done.recording["energy/residual"]).max() > done.released
+    assert not closure(done).is_wide
+    assert not closure(done).sentence
 
 
 def test_a_failed_run_is_judged_as_far_as_it_came(example: Run) -> None:

@@ -73,10 +73,10 @@ def test_a_study_is_compiled_and_exudyn_looks_at_a_hundredth(tmp_path: Path) -> 
     assert [o["name"] for o in check["outputs"]] == ["ground/force_normal", "ground/sinkage"]
     provenance, _ = read_table(tmp_path / "out" / case_store.PROVENANCE)
     assert provenance["integrator"] == ["compiled"] * 4
-    assert len(case_store.on_shelf(tmp_path / "out")) == 5
+    assert len(case_store.stored_keys(tmp_path / "out")) == 5
     # where nothing is lacking nothing is run, Exudyn's case neither
     assert carried_out(tmp_path, FULL, FEW)["reference_check"] == check
-    assert len(case_store.on_shelf(tmp_path / "out")) == 5
+    assert len(case_store.stored_keys(tmp_path / "out")) == 5
 
 
 def test_who_states_exudyn_has_it_and_the_same_answer(tmp_path: Path) -> None:
@@ -114,7 +114,7 @@ def test_workers_change_no_bit_of_the_answer(tmp_path: Path) -> None:
         folder, way = tmp_path / str(workers), Way(workers=workers)
         done = conduct(study, folder, way)
         tables.append((folder / case_store.TABLE).read_bytes())
-        checks.append(reference.checked(study, folder, way, done))
+        checks.append(reference.checked(study, folder, way, done, reference.chosen(study, done)))
     assert tables[0] == tables[1]
     assert checks[0] == checks[1]
 
@@ -166,7 +166,7 @@ def test_the_check_counts_what_ended_otherwise(tmp_path: Path, monkeypatch: pyte
     higher = {**rows[0].measures, "ground/force_normal": rows[0].measures["ground/force_normal"] / 1.25}
     none = replace(rows[1], status="failed", measures={})
     monkeypatch.setattr(reference, "evaluate", lambda *_: [replace(rows[0], measures=higher), none, rows[2]])
-    check = reference.checked(study, tmp_path, Way(), done)
+    check = reference.checked(study, tmp_path, Way(), done, at)
     assert check is not None
     assert (check["cases"], check["ended_otherwise"]) == (3, 1)
     force, sinkage = check["outputs"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shlex
 import shutil
@@ -21,6 +20,7 @@ from typer.testing import CliRunner
 import rollover as rollover_package
 from rollover.cli.main import app
 from rollover.spec.document import shipped_folder
+from tests.rollover import forked
 from tests.viz.picture import has_software_driver
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -96,11 +96,8 @@ def run_line(line: str, here: Path) -> None:
     if line == BY_CI:
         line = made_by_make()
     if line.startswith(".venv/bin/rollover ") and ".py" in line:  # what it loads stays in the process for good
-        done = subprocess.run(
-            [sys.executable, "-m", "tests.rollover.command", *shlex.split(line)[1:]],
-            cwd=here, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+        apart = forked.command(*shlex.split(line)[1:], cwd=here)
+        assert apart.returncode == 0, f"{line}\n{apart.stdout}{apart.stderr}"
     elif line.startswith(".venv/bin/rollover "):
         done = rollover(line)
         assert done.exit_code == 0, f"{line}\n{done.output}\n{done.exception!r}"

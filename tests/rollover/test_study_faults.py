@@ -95,13 +95,13 @@ def test_four_faults_cost_four_rows(sixty: tuple[Path, Path]) -> None:
 
 def test_killed_three_times_it_ends_with_the_same_table(sixty: tuple[Path, Path], tmp_path: Path) -> None:
     study, reference = sixty
-    out, chance = tmp_path / "out", random.Random()
+    out, chance = tmp_path / "out", random.Random(5)
     seen: dict[str, tuple[int, int]] = {}
     for _ in range(3):
         process = begun(study, out)
         wanted = len(seen) + chance.randint(1, 15)
-        until = time.monotonic() + 60.0
-        while len(files(out)) < wanted and process.poll() is None and time.monotonic() < until:
+        # as long as it takes on a busy machine: one that stands still meets the time limit of the test
+        while len(files(out)) < wanted and process.poll() is None:
             time.sleep(chance.uniform(0.001, 0.02))
         assert process.poll() is None, process.communicate()[1]
         os.killpg(process.pid, signal.SIGKILL)

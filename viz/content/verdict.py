@@ -297,12 +297,10 @@ def in_words(flag: str, domain: Domain) -> str:
 def _ledger(run: Run) -> list[str]:
     if not run.ledger:
         return []
-    residual = run.ledger.get("residual", math.nan)
-    share = abs(residual) / run.released if run.released > 0.0 else math.nan
-    judged = f", {100.0 * share:.2g} % of the {joules(run.released)} released" if math.isfinite(share) else ""
+    residual, closed = run.ledger.get("residual", math.nan), closure(run)
+    judged = f", {100.0 * closed.end:.2g} % of the {joules(run.released)} released" if math.isfinite(closed.end) else ""
     names = [name for name, value in run.ledger.items() if name != "residual" and value]
     lines = [f"**Energy:** {joules(residual)} unaccounted for{judged}.", ""]
-    closed = closure(run)
     if closed.is_wide:
         lines += [f"**\N{WARNING SIGN} {closed.warning[0].upper()}{closed.warning[1:]}.**", ""]
     elif closed.sentence:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ground.surface import height
-from rollover.assessment.clearance import approaches
+from rollover.assessment.clearance import Approach
 from rollover.dynamics.result import Run
 from rollover.spec.frames import from_quaternions
 from rollover.spec.shapes import Box, Points, Shape, Tube
@@ -19,10 +21,9 @@ Array = NDArray[np.float64]
 FRONT, SIDE = (1, 2), (0, 2)  # the vehicle axes that a view shows, across and up
 
 
-def clearance_figure(run: Run) -> Figure | None:
+def clearance_figure(run: Run, found: Sequence[Approach]) -> Figure | None:
     """Both views in vehicle axes when structure or ground came nearest; None for a vehicle without a zone."""
     vehicle = run.scenario.vehicle
-    found = approaches(run)
     if not found or not isinstance(vehicle, Vehicle) or vehicle.rops is None or vehicle.rops.clearance_zone is None:
         return None
     nearest = min(found, key=lambda a: a.least)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from rollover.assessment.clearance import approaches
+from rollover.assessment.clearance import Approach, approaches
 from rollover.assessment.criteria import Criterion
 from rollover.assessment.criteria import in_words as standards_in_words
 from rollover.assessment.ledger import closure
@@ -36,9 +37,15 @@ def page(
     answer: Mapping[str, Any],
     *,
     rows: Sequence[Criterion] = (),
+    near: Sequence[Approach] | None = None,
     command: str = "rollover run scenario.yaml",
 ) -> str:
-    """HTML of a run's report. `answer` is its run.json, `rows` what it was held against."""
+    """HTML of a run's report. `answer` is its run.json, `rows` what it was held against.
+
+    `near` are its `approaches`, where they have been worked out.
+    """
+    if near is None:
+        near = approaches(run)
     blocks: list[Block] = [
         *_warnings(run, answer),
         *differences_section(run.scenario),
@@ -48,17 +55,19 @@ def page(
         *_domain(run, peaks),
         *_standards(run, rows),
     ]
-    blocks += [*_histories(run, peaks), *_structure(run, rows), *_ledger(run), *_course(run, answer)]
+    blocks += [*_histories(run, peaks), *_structure(run, rows, near), *_ledger(run), *_course(run, answer)]
     return render(
         title=run.scenario.title,
         subtitle="Rollover load study: one run",
-        headline=headline(run, peaks, rows),
+        headline=headline(run, peaks, rows, near),
         blocks=blocks,
         footer=Footer(command=command, scenario_hash=answer["scenario_hash"], versions=answer["versions"]),
     )
 
 
-def headline(run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = ()) -> Headline:
+def headline(
+    run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = (), near: Sequence[Approach] | None = None
+) -> Headline:
     """The highest load of the structure, or of the ground without one; domain, convergence and criteria behind it."""
     if run.status == "failed":
         detail = (
@@ -72,7 +81,7 @@ def headline(run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = ()
     if isinstance(run.scenario.initiation, TiltTable) and found is not None:
         sentence = found.sentence  # what turns there is the weight: no load answers the question
     parts = [standing(peak.domain_flags) if rests_on_ground(run) else "the ground law took no part"]
-    if judged := _judged(run, rows):
+    if judged := _judged(run, rows, near):
         sentence, parts = judged, [load, *parts]
     # what the whole run rests on concerns its answer, also where the peak itself came from a tyre
     unsure = bool(peak.domain_flags) or "uncalibrated" in run.domain_flags
@@ -96,14 +105,14 @@ def headline(run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = ()
     return Headline(sentence=f"{sentence}.", detail=f"{text[0].upper()}{text[1:]}.", state=state)
 
 
-def _judged(run: Run, rows: Sequence[Criterion]) -> str:
+def _judged(run: Run, rows: Sequence[Criterion], near: Sequence[Approach] | None) -> str:
     """What a test on a stand is made for: whether its requirements are met, with the least clearance; else nothing."""
     asked = [row for row in rows if row.verdict != "compared"]
     if not run.tests or not asked or all(row.verdict == "no verdict" for row in asked):
         return ""
     met = sum(row.verdict == "met" for row in asked)
     count = f"all {len(asked)}" if met == len(asked) else f"{met} of {len(asked)}"
-    found = min(approaches(run), key=lambda a: a.least, default=None)
+    found = min(approaches(run) if near is None else near, key=lambda a: a.least, default=None)
     if found is None:
         return f"{count.capitalize()} requirements are met"
     which = "the structure" if found.what == "structure" else "the ground"
@@ -241,7 +250,7 @@ def _raw(run: Run, parts: tuple[str, ...], factor: float) -> Curve:
     return Curve(name="raw", x=run.recording.time, y=values, role="second", thin=True)
 
 
-def _structure(run: Run, rows: Sequence[Criterion]) -> list[Block]:
+def _structure(run: Run, rows: Sequence[Criterion], near: Sequence[Approach]) -> list[Block]:
     """Force and energy of the structure over its deflection, with the energies that are asked for; the zone."""
     blocks: list[Block] = []
     if "rops/deflection" in run.recording.channels and np.any(run.recording["rops/force"] > 0.0):
@@ -261,7 +270,7 @@ def _structure(run: Run, rows: Sequence[Criterion]) -> list[Block]:
         asked = "; dashed: asked for in the standards' static tests" if levels else ""
         absorbed = joules(float(run.recording["rops/energy"].max()))
         blocks.append(Figure(svg=svg, caption=f"Energy absorbed over deflection, at most {absorbed}{asked}."))
-    if run.status == "done" and (zone := clearance_figure(run)) is not None:
+    if run.status == "done" and (zone := clearance_figure(run, near)) is not None:
         blocks.append(zone)
     return [Section(title="Structure", blocks=blocks)] if blocks else []
 
@@ -271,11 +280,11 @@ def _ledger(run: Run) -> list[Block]:
         return []
     values = {name: 1e-3 * value for name, value in run.ledger.items() if known(value)}
     residual = run.ledger.get("residual", float("nan"))
-    share = f", {_percent(abs(residual) / run.released)} of the {joules(run.released)} released" if run.released else ""
+    closed = closure(run)
+    share = f", {_percent(closed.end)} of the {joules(run.released)} released" if math.isfinite(closed.end) else ""
     svg = plots.bars(values, label="energy at the end, kJ", roles={"residual": "limit"})
     caption = f"The energy ledger at the end of the run: {joules(residual)} unaccounted for{share}."
     blocks: list[Block] = [Figure(svg=svg, caption=caption)]
-    closed = closure(run)
     if closed.is_wide:
         blocks.insert(0, Note(text=f"{title(closed.warning)}.", warning=True))
     elif closed.sentence:

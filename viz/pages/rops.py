@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from rollover.assessment import criterion
 from rollover.assessment.stand_results import findings
-from viz.content.blocks import Block, Cell, Figure, Footer, Headline, Note, Section, Table
+from viz.content.blocks import Block, Cell, Figure, Footer, Headline, Note, Section, State, Table
 from viz.figures import plots
 from viz.figures.plots import Curve, Role
 from viz.pages.page import render
@@ -86,19 +87,11 @@ def _results(found: Any) -> list[Block]:
 
 def _criteria(answer: Mapping[str, Any]) -> Table:
     rows: list[list[str | Cell]] = []
-    for c in answer["criteria"]:
-        r = c["requirement"]
-        state = {"met": "pass", "not met": "fail"}.get(c["verdict"], "warn")
-        unit = {"J": ("kJ", 1e-3), "N": ("kN", 1e-3), "1": ("%", 100.0)}[r["unit"]]
-        rows.append(
-            [
-                f"{r['standard']}: {r['name']}",
-                f"{unit[1] * r['value']:.4g} {unit[0]}",
-                f"{unit[1] * c['simulated']:.4g} {unit[0]}",
-                Cell(text=c["verdict"], state=state),  # type: ignore[arg-type]
-                c["note"],
-            ]
-        )
+    for row in map(criterion.read, answer["criteria"]):
+        asked, reached, _ = row.in_words
+        state: State = "pass" if row.verdict == "met" else "fail" if row.verdict == "not met" else "warn"
+        name = f"{row.requirement.standard}: {row.requirement.name}"
+        rows.append([name, asked, reached, Cell(text=row.verdict, state=state), row.note])
     return Table(columns=("requirement", "asked", "reached", "verdict", "how"), rows=rows, numeric=(1, 2))
 
 

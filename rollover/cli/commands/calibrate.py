@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.cli.commands.common import BROKE, AsJson, Force, Setting, answering, app, manual, settings
+from rollover.cli.commands.common import BROKE, AsJson, Force, Setting, answering, app, manual, scenario_with, settings
 from rollover.system.arguments import MOST_CLOCK
 from rollover.system.errors import InputError
 
@@ -64,7 +64,6 @@ def calibrate(
     as_json: AsJson = False,
 ) -> None:
     """Fit values of a scenario to recordings, with intervals, and say what the recordings cannot determine."""
-    from rollover import scenario as scenarios
     from rollover.assessment import results
     from rollover.calibration.account import FORMAT, account, table
     from rollover.calibration.posterior import installed
@@ -73,10 +72,7 @@ def calibrate(
     from rollover.comparison.recordings import read
     from rollover.spec import document
 
-    path = document.find(scenario)
-    chosen = scenarios.load(path)
-    if set_:
-        chosen = chosen.replaced(settings(set_), origin="--set")
+    path, chosen = scenario_with(scenario, set_)
     request = Request.of(chosen, read(recordings, profile), fit, hold_out or [], by=("--fit", "--hold-out"))
     folder = out or Path("out", "calibrate", path.stem)
     about: dict[str, Any] = {

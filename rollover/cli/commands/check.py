@@ -101,13 +101,13 @@ def _recording(
     gravity, clock, notes = 9.81, None, list(recording.notes)
     if scenario is not None:
         from rollover import scenario as scenarios
-        from rollover.comparison.onset import UntoldError, timed
+        from rollover.comparison.onset import UnknownOnsetError, timed
 
         under = scenarios.load(scenario).replaced(recording.conditions, origin=f"{name}: conditions")
         gravity = under.gravity
         try:
             clock = timed(name, recording, under).zero
-        except UntoldError as e:
+        except UnknownOnsetError as e:
             notes += [fault.message for fault in e.faults]
     first = float(recording.time[0]) if is_far(recording.time) else 0.0
     if clock is not None:

@@ -7,12 +7,14 @@ that is full, memory that is not there), 130 interrupted.
 from __future__ import annotations
 
 import functools
+import json
 import math
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
-from typing import Annotated, Any, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -22,6 +24,9 @@ from typer.models import CommandFunctionType
 from rollover.system.errors import Fault, InputError
 from rollover.system.refusals import refused, told
 from rollover.system.writing import working
+
+if TYPE_CHECKING:
+    from rollover.scenario import Scenario
 
 THE_ANSWER_IS_NO, WRONG_INPUT, FAILED, INTERRUPTED, BUG = 1, 2, 3, 130, 70
 MACHINE = 74  # as sysexits.h has it: an error of input or output
@@ -203,6 +208,41 @@ def settings(given: list[str], option: str = "--set") -> dict[str, Any]:
             raise InputError(Fault(file=option, path=path, message="given twice; once is allowed"))
         settings[path] = value
     return settings
+
+
+def with_settings(chosen: Scenario, set_: list[str] | None) -> Scenario:
+    """The scenario with the values of `--set`. Raises `InputError`."""
+    return chosen.replaced(settings(set_), origin="--set") if set_ else chosen
+
+
+def scenario_with(name: str, set_: list[str] | None) -> tuple[Path, Scenario]:
+    """File of the scenario of that name, and the scenario with the values of `--set`. Raises `InputError`."""
+    from rollover import scenario
+    from rollover.spec import document
+
+    path = document.find(name)
+    return path, with_settings(scenario.load(path), set_)
+
+
+def hand_out(
+    answer: Mapping[str, Any],
+    page: str,
+    folder: Path,
+    names: tuple[str, str],
+    *,
+    as_json: bool,
+    show: Callable[[], None],
+) -> None:
+    """Write an answer as JSON and its page to a folder, under two `names`, and print the JSON or `show` the answer."""
+    from rollover.assessment import results
+
+    with results.whole(folder) as part:
+        results.write_json(part / names[0], answer)
+        (part / names[1]).write_text(page, encoding="utf-8")
+    if as_json:
+        print(json.dumps(answer, indent=2))
+    else:
+        show()
 
 
 def number_by_channel(text: str) -> tuple[str | None, float]:

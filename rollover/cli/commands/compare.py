@@ -21,7 +21,7 @@ from rollover.cli.commands.common import (
     answering,
     app,
     manual,
-    settings,
+    scenario_with,
 )
 from rollover.system.errors import THERE, Fault, InputError, absent, cured
 
@@ -76,7 +76,6 @@ def compare(
 
     Nothing is shifted in time but a clock in doubt, to the zero that the recording shows.
     """
-    from rollover import scenario as scenarios
     from rollover.assessment import results
     from rollover.cli import console
     from rollover.comparison.compared import FORMAT, account, compared
@@ -89,10 +88,7 @@ def compare(
         refused = {"--set": set_, "--cfc": cfc, "--profile": profile}
         _two_runs(scenario, recordings, [name for name, given in refused.items() if given], out, force, as_json)
         return
-    path = document.find(scenario)
-    chosen = scenarios.load(path)
-    if set_:
-        chosen = chosen.replaced(settings(set_), origin="--set")
+    path, chosen = scenario_with(scenario, set_)
     measured = read(recordings, profile)
     folder = out or Path("out", "compare", path.stem)
     pictures, curves = files_of(list(measured), "compare", ".rrd"), curve_files(list(measured))

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.cli.commands.common import AsJson, Force, Setting, answering, app, manual, number_by_channel, settings
+from rollover.cli.commands.common import (
+    AsJson,
+    Force,
+    Setting,
+    answering,
+    app,
+    manual,
+    number_by_channel,
+    scenario_with,
+)
 from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -127,7 +136,6 @@ def diagnose(
         # as `Executor` does, but beside all that is imported and read here
         begin_server("rollover.diagnosis.fit.warmup")
 
-    from rollover import scenario as scenarios
     from rollover.assessment import results
     from rollover.cli import console
     from rollover.comparison.recordings import held_out, read
@@ -139,10 +147,7 @@ def diagnose(
     from rollover.spec import document
     from rollover.system.writing import notes
 
-    path = document.find(scenario)
-    chosen = scenarios.load(path)
-    if set_:
-        chosen = chosen.replaced(settings(set_), origin="--set")
+    path, chosen = scenario_with(scenario, set_)
     measured = read(recordings, profile)
     check(chosen, measured)
     held = held_out(list(measured), hold_out or [], "--hold-out")

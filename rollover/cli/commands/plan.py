@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shlex
 from collections.abc import Sequence
@@ -11,7 +10,17 @@ from typing import Annotated, Any
 
 import typer
 
-from rollover.cli.commands.common import AsJson, Force, Setting, answering, app, manual, noises, settings
+from rollover.cli.commands.common import (
+    AsJson,
+    Force,
+    Setting,
+    answering,
+    app,
+    hand_out,
+    manual,
+    noises,
+    scenario_with,
+)
 from rollover.system.errors import Fault, InputError
 
 
@@ -68,7 +77,6 @@ def plan_(
     as_json: AsJson = False,
 ) -> None:
     """Say before a drop test which effects it would show, which it would tell apart, and what to measure beside."""
-    from rollover import scenario as scenarios
     from rollover.assessment import results
     from rollover.cli import console
     from rollover.comparison.synthesis import DROP
@@ -78,10 +86,7 @@ def plan_(
     from rollover.dynamics.drop_test import unfit
     from rollover.spec import document
 
-    path = document.find(scenario)
-    chosen = scenarios.load(path)
-    if set_:
-        chosen = chosen.replaced(settings(set_), origin="--set")
+    path, chosen = scenario_with(scenario, set_)
     if reason := unfit(chosen):
         raise InputError(Fault(file=str(path), message=f"{reason}; drops of a striker on level ground can be planned"))
     share, sigmas = noises(noise or [])
@@ -119,13 +124,7 @@ def plan_(
         scenario_hash=about["scenario_hash"],
         versions=results.versions(),
     )
-    with results.whole(folder) as part:
-        results.write_json(part / JSON, answer)
-        (part / PAGE).write_text(text, encoding="utf-8")
-    if as_json:
-        print(json.dumps(answer, indent=2))
-    else:
-        console.plan(found, str(folder))
+    hand_out(answer, text, folder, (JSON, PAGE), as_json=as_json, show=lambda: console.plan(found, str(folder)))
 
 
 def _pairs(given: Sequence[str]) -> list[tuple[str, str]]:

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from rollover.cli.commands.common import AsJson, Force, Setting, answering, app, manual, settings
+from rollover.cli.commands.common import (
+    AsJson,
+    Force,
+    Setting,
+    answering,
+    app,
+    hand_out,
+    manual,
+    settings,
+    with_settings,
+)
 
 JSON, PAGE = "rolling.json", "report.html"
 
@@ -45,9 +54,7 @@ def rolling_(
     from rollover.spec import document
     from viz.pages.rolling import page
 
-    chosen = scenario_of(name)
-    if set_:
-        chosen = chosen.replaced(settings(set_), origin="--set")
+    chosen = with_settings(scenario_of(name), set_)
     given = {symbol: value.plain for symbol, value in settings(input_ or [], OPTION).items()}
     asked, found = rolled(chosen, given)
     folder = out or Path("out", "rolling", Path(name).stem)
@@ -57,10 +64,4 @@ def rolling_(
     answer = account(asked, found, about)
     words = [f"--set {shlex.quote(s)}" for s in set_ or []] + [f"{OPTION} {shlex.quote(s)}" for s in input_ or []]
     text = page(answer, command=" ".join(["rollover rolling", shlex.quote(name), *words]))
-    with results.whole(folder) as part:
-        results.write_json(part / JSON, answer)
-        (part / PAGE).write_text(text, encoding="utf-8")
-    if as_json:
-        print(json.dumps(answer, indent=2))
-    else:
-        console.rolling(answer, str(folder))
+    hand_out(answer, text, folder, (JSON, PAGE), as_json=as_json, show=lambda: console.rolling(answer, str(folder)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,9 +15,11 @@ from rollover.cli.commands.common import (
     Setting,
     answering,
     app,
+    hand_out,
     manual,
-    settings,
+    with_settings,
 )
+from rollover.system.arguments import SEGMENTS
 
 JSON, PAGE = "rops.json", "report.html"
 
@@ -42,7 +43,7 @@ def rops_(
     mass: Annotated[
         float | None, typer.Option(help="Of the vehicle, kg: needed for a ROPS by itself.", min=1.0, max=1e6)
     ] = None,
-    segments: Annotated[int, typer.Option(help="Elements to a member.", min=2, max=200)] = 12,
+    segments: Annotated[int, typer.Option(help="Elements to a member.", min=2, max=200)] = SEGMENTS,
     clamped: Annotated[bool, typer.Option("--clamped", help="Feet held still instead of on their mounts.")] = False,
     set_: Setting = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/rops/NAME")] = None,
@@ -57,9 +58,7 @@ def rops_(
     from rollover.spec import document
     from viz.pages.rops import page
 
-    chosen = scenario_of(name, mass)
-    if set_:
-        chosen = chosen.replaced(settings(set_), origin="--set")
+    chosen = with_settings(scenario_of(name, mass), set_)
     folder = out or Path("out", "rops", Path(name).stem)
     about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), **chosen.own_code}
     about["origin"] = results.origin(file_of(name), folder, set_ or [])
@@ -72,14 +71,8 @@ def rops_(
         raise typer.Exit(FAILED) from None
     answer = account(found, about)
     words = [] if mass is None else ["--mass", f"{mass:g}"]
-    words += ["--segments", str(segments)] if segments != 12 else []
+    words += ["--segments", str(segments)] if segments != SEGMENTS else []
     words += ["--clamped"] if clamped else []
     words += [word for s in set_ or [] for word in ("--set", s)]
     text = page(answer, command=" ".join(map(shlex.quote, ["rollover", "rops", name, *words])))
-    with results.whole(folder) as part:
-        results.write_json(part / JSON, answer)
-        (part / PAGE).write_text(text, encoding="utf-8")
-    if as_json:
-        print(json.dumps(answer, indent=2))
-    else:
-        console.rops(answer, str(folder))
+    hand_out(answer, text, folder, (JSON, PAGE), as_json=as_json, show=lambda: console.rops(answer, str(folder)))

@@ -6,7 +6,7 @@ import json
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,11 +24,11 @@ from rollover.cli.commands.common import (
     answering,
     app,
     manual,
-    settings,
+    scenario_with,
 )
 
 if TYPE_CHECKING:
-    from rollover.assessment.assessed import Progress
+    from rollover.assessment.assessed import AssessedRun, Progress
     from rollover.assessment.criteria import Criterion
     from rollover.assessment.loads import PeakLoad
     from rollover.dynamics.result import Run
@@ -71,12 +71,7 @@ def run(
     from rollover.cli import console
     from rollover.spec import document
 
-    path = document.find(scenario)
-    from rollover import scenario as scenarios
-
-    chosen = scenarios.load(path)
-    if set_:
-        chosen = chosen.replaced(settings(set_), origin="--set")
+    path, chosen = scenario_with(scenario, set_)
     for line in chosen.idle:
         console.say(f"{path}: {line}")
     compiles = not is_warm(chosen.integrator)
@@ -91,9 +86,10 @@ def run(
     results.claim(folder, document.content_hash(chosen), force=force, made_from=made_from, say=console.say)
     with document.named(path):
         found = assessed(chosen, half_step=half_step, watch=_watched)
-    done, again, peaks, rows = found.result, found.half_step, found.peaks, found.criteria
-    if peaks and ensemble > 1:
-        peaks = _with_scatter(peaks, chosen, ensemble)
+    done, again, rows = found.result, found.half_step, found.criteria
+    if found.peaks and ensemble > 1:
+        found = replace(found, peaks=_with_scatter(found.peaks, chosen, ensemble))
+    peaks = found.peaks
     command = " ".join(["rollover", "run", scenario, *(f"--set {shlex.quote(s)}" for s in set_ or [])])
     answer = results.write(
         folder,
@@ -102,7 +98,7 @@ def run(
         criteria=[asdict(row) for row in rows],
         half_step=again,
         picture=_picture(done, peaks),
-        page=lambda answer: _page(done, peaks, answer, rows, command),
+        page=lambda answer: _page(found, answer, command),
         force=force,
         made_from=made_from,
     )
@@ -154,12 +150,10 @@ def _with_scatter(peaks: Sequence[PeakLoad], scenario: Scenario, starts: int) ->
         return tuple(peaks)
 
 
-def _page(
-    done: Run, peaks: Sequence[PeakLoad], answer: Mapping[str, Any], rows: Sequence[Criterion], command: str
-) -> str:
+def _page(found: AssessedRun, answer: Mapping[str, Any], command: str) -> str:
     from viz.pages import report
 
-    return report.page(done, peaks, answer, rows=rows, command=command)
+    return report.page(found.result, found.peaks, answer, rows=found.criteria, near=found.approaches, command=command)
 
 
 def _picture(done: Run, peaks: Sequence[PeakLoad]) -> Callable[[Path], None] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,8 +17,9 @@ from rollover.cli.commands.common import (
     Setting,
     answering,
     app,
+    hand_out,
     manual,
-    settings,
+    with_settings,
 )
 
 JSON, PAGE = "stability.json", "report.html"
@@ -48,9 +48,7 @@ def stability_(
     from rollover.cli import console
     from rollover.spec import document
 
-    chosen = scenario_of(name)
-    if set_:
-        chosen = chosen.replaced(settings(set_), origin="--set")
+    chosen = with_settings(scenario_of(name), set_)
     folder = out or Path("out", "stability", Path(name).stem)
     about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), **chosen.own_code}
     about["origin"] = results.origin(file_of(name), folder, set_ or [])
@@ -71,10 +69,4 @@ def stability_(
     from viz.pages.stability import page
 
     text = page(answer, command=command)
-    with results.whole(folder) as part:
-        results.write_json(part / JSON, answer)
-        (part / PAGE).write_text(text, encoding="utf-8")
-    if as_json:
-        print(json.dumps(answer, indent=2))
-    else:
-        console.stability(answer, str(folder))
+    hand_out(answer, text, folder, (JSON, PAGE), as_json=as_json, show=lambda: console.stability(answer, str(folder)))

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.settings import SETTINGS
-from rollover.recording import Doubt
+from rollover.recording import StandardUncertainty
 from rollover.scenario import Scenario
 from rollover.spec.document import paths
 from rollover.system.errors import Fault, InputError, hint
@@ -51,7 +51,9 @@ def marginalised(columns: Array) -> Marginalised:
     return Marginalised(directions=U[:, kept], shares=1.0 - 1.0 / np.sqrt(1.0 + S[kept] ** 2))
 
 
-def nuisance_parameters(scenario: Scenario, uncertainty: Mapping[str, Doubt], origin: str = "") -> list[dict[str, Any]]:
+def nuisance_parameters(
+    scenario: Scenario, uncertainty: Mapping[str, StandardUncertainty], origin: str = ""
+) -> list[dict[str, Any]]:
     """Values to exchange for an error of one standard deviation, one mapping for each uncertain number.
 
     Raises `InputError` for a path that the scenario does not have, or that is no number or list of as many.

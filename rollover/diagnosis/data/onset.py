@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rollover.comparison.onset import CLEAR, IN_A_ROW, QUIET, UntoldError, is_apart, is_quiet, timed
+from rollover.comparison.onset import CLEAR, IN_A_ROW, QUIET, UnknownOnsetError, is_apart, is_quiet, timed
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.settings import SETTINGS
@@ -89,7 +89,7 @@ def _moved(scenario: Scenario, name: str, recording: Recording) -> tuple[Recordi
         return recording, None
     try:
         at = timed(name, recording, under, trusting=True)
-    except UntoldError:
+    except UnknownOnsetError:
         if apart:
             raise
         return recording, None  # the shift that is fitted may tell

@@ -26,7 +26,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock, time_shift_step
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
-from rollover.diagnosis.noise.ensemble import heavy_tail, neighbours_on_same_course, with_sample_weights
+from rollover.diagnosis.noise.ensemble import heavy_tail, with_sample_weights, without_diverged
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
@@ -185,7 +185,7 @@ def ensemble_mean_misfit(problem: Problem, fitted: Fitted) -> tuple[float, float
     problem.simulate_ensembles(changes)
     total = before = 0.0
     for e, block in zip(problem.dataset, fitted.blocks, strict=True):
-        perturbed = neighbours_on_same_course(e, e.simulator.perturbed(changes, block.shift), e.first_impact)
+        perturbed = without_diverged(e, e.simulator.perturbed(changes, block.shift), e.first_impact)
         raw = [d for d in (e.raw(perturbed_run) for perturbed_run in perturbed) if np.all(np.isfinite(d))]
         w = block.unweighted_residual
         if raw:

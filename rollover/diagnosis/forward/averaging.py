@@ -71,9 +71,9 @@ class Averaged:
         """See `Simulator`."""
         return [self._means(d) for d in self.inner.perturbed(changes, shift, parts)]
 
-    def settle(self) -> None:
+    def choose_medoid(self) -> None:
         """See `Simulator`."""
-        self.inner.settle()
+        self.inner.choose_medoid()
 
     def until(self, n: int) -> Averaged:
         """See `Simulator`."""

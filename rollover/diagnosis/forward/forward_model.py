@@ -42,7 +42,7 @@ class Simulator(Protocol):
         Each step of theirs is one of at least `parts` of the scenario's.
         """
 
-    def settle(self) -> None:
+    def choose_medoid(self) -> None:
         """Of runs that nobody could tell apart take the one that is the most like all."""
 
     def until(self, n: int) -> Simulator:
@@ -110,7 +110,7 @@ class DropSimulator:
         del changes, shift, parts
         return []
 
-    def settle(self) -> None:
+    def choose_medoid(self) -> None:
         """See `Simulator`."""
 
     def until(self, n: int) -> DropSimulator:

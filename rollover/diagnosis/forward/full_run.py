@@ -195,7 +195,7 @@ class RunSimulator:
         """Changes of all neighbours of a run with `changes`, see `perturbed`."""
         return [{**changes, **self._beside(one, parts)} for one in TUNING.perturbations]
 
-    def settle(self) -> None:
+    def choose_medoid(self) -> None:
         """Lay the grid where the run is the most like all others: of two ways that runs go, it takes the common one.
 
         The medoid: the least sum of the distances to the others and to the neighbours, each the root mean square over

@@ -93,20 +93,20 @@ def with_secondary(problem: Problem, fitted: Fitted) -> tuple[Fitted, Array, lis
     Such a shape is where it is usual, spread evenly over its range as far as the recordings do not tell; one that is
     usually not there is left out, and where a look costs a run all are: see `shape_variance`.
     """
-    candidates, x, kept, prior = [], list[float](), list[int](), list[float]()
+    candidates, x, primary, prior = [], list[float](), list[int](), list[float]()
     for c, place in with_slices(fitted.candidates):
         own = fitted.x[place]
-        kept += range(len(x), len(x) + len(own))
+        primary += range(len(x), len(x) + len(own))
         usual = {name: getattr(EFFECTS[c.id](), name) for name in c.shapes}
         estimated = all(v is not None and c.shapes[name].low <= v <= c.shapes[name].high for name, v in usual.items())
         whole = c.with_secondary(own)[0] if estimated and usual else own
         prior += [GENTLE] * len(own) + [EVENLY**-2] * (len(whole) - len(own))
         x += whole
         candidates.append(c.whole() if estimated else c)
-    if len(x) > len(kept) and not problem.effort.is_ensemble:
+    if len(x) > len(primary) and not problem.effort.is_ensemble:
         found = linearised(problem, candidates, x, [b.shift for b in fitted.blocks])
         if found is not None:
-            return found, np.array(prior), kept
+            return found, np.array(prior), primary
     # of a parameter of a narrow effect recordings may tell nothing at all: it lies evenly in its range
     own_prior = [EVENLY**-2 if c.is_narrow else GENTLE for c in fitted.candidates for _ in c.search]
     return fitted, np.array(own_prior), list(range(len(fitted.x)))
@@ -318,7 +318,7 @@ def intervals(
     as wide as slopes say. `coarse` is the fit that `refined_by_ensemble_mean` moved to this one.
     """
     estimated, coarse = fitted, coarse or fitted
-    fitted, prior, kept = with_secondary(problem, fitted)
+    fitted, prior, primary = with_secondary(problem, fitted)
     p = len(fitted.x)
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + np.diag(prior)
     inverse: Array = np.asarray(np.linalg.inv(A), dtype=np.float64)
@@ -343,12 +343,12 @@ def intervals(
         moved += ensemble_variance(problem.dataset, fitted.blocks, inverse) + shape_variance(problem, fitted, inverse)
         rest = ensemble_mean_step(problem.dataset, fitted.blocks)
     moved += rest**2
-    moved[kept] += ((np.array(estimated.x) - np.array(coarse.x)) / (SETTINGS.fit.ensemble_mean.finer_parts - 1)) ** 2
+    moved[primary] += ((np.array(estimated.x) - np.array(coarse.x)) / (SETTINGS.fit.ensemble_mean.finer_parts - 1)) ** 2
     variance = sd**2 + moved
     if strayed:
         variance = np.maximum(variance, between_recording_variance(problem.dataset, fitted.blocks, inverse))
-    sd = np.sqrt(variance)[kept]
-    own = np.sqrt(dispersion * np.diag(inverse))[kept]
+    sd = np.sqrt(variance)[primary]
+    own = np.sqrt(dispersion * np.diag(inverse))[primary]
     rough = np.full((own.size, 2), np.nan)
     if strayed and sides is None:
         rough = quadratic_extents(problem, problem.again(coarse), own, dispersion)

@@ -28,10 +28,10 @@ from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.noise.autoregression import Rest, line_spectra, rests
 from rollover.diagnosis.noise.ensemble import (
+    has_diverged,
     leave_one_out_neighbours,
-    p_value_of_other_courses,
+    p_value_of_divergence,
     shares,
-    took_other_course,
 )
 from rollover.diagnosis.noise.outliers import outlier_p_value
 from rollover.diagnosis.noise.spectral_lines import basis as line
@@ -117,7 +117,7 @@ def mismatch_of(
                         due = Expected(signal.weight[inside], rest, perturbed[r][:, rows], worth[r][:, rows])
                     cells.append(_cell(r, signal.channel, name, time[inside], rows, block, line_spectrum, due))
     # after an impact a recording that took another course tells nothing by itself
-    other = [took_other_course(b.heavy_tail) for b in blocks]
+    other = [has_diverged(b.heavy_tail) for b in blocks]
     telling = [c for c in cells if not (other[c.recording] and c.start >= dataset[c.recording].first_impact)]
     # within half a step of its digits a channel tells nothing, however alike neighbouring samples err
     stepped = {(r, s.channel) for r, e in enumerate(dataset) for s in e.signals if s.step > 0.0}
@@ -126,7 +126,7 @@ def mismatch_of(
     for c in telling:
         by_channel.setdefault(c.channel, []).append(blocks[c.recording].residual_for_squares[c.rows])
     p = min(_p_value(telling, len(blocks)), outlier_p_value(np.concatenate(w) for w in by_channel.values()))
-    sent = p_value_of_other_courses(sum(other), len(other))
+    sent = p_value_of_divergence(sum(other), len(other))
     p = (
         min(p, sent) if sent <= SETTINGS.noise.ensemble.other_course_p_value else p
     )  # one may, not all of them: whole numbers, and no p-value until they tell

@@ -68,10 +68,10 @@ def roughness_extents(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[
         squares = sum(np.sum(left**2, axis=1) for left, _ in recordings)
         # not the least: one run may take the recording's own course
         low = np.sort(squares)[TUNING.least_places // 2 - 1]
-        kept = np.abs(squares - low) < TUNING.outlier_ratio * due * t**2 + TUNING.outlier_rise * due
-        if np.sum(kept) < TUNING.least_places:
+        inliers = np.abs(squares - low) < TUNING.outlier_ratio * due * t**2 + TUNING.outlier_rise * due
+        if np.sum(inliers) < TUNING.least_places:
             continue
-        found = _slope(t[kept], [(left[kept], J) for left, J in recordings], due)
+        found = _slope(t[inliers], [(left[inliers], J) for left, J in recordings], due)
         if found.clear > TUNING.some_slope and found.flat < stage[-1]:
             best = found
             if found.clear > TUNING.clear_slope:

@@ -28,7 +28,7 @@ class Judged:
     by_recording: tuple[tuple[str, float], ...]
 
 
-def judged(problem: Problem, fitted: Fitted, kept: Sequence[Dataset], groups: Sequence[Sequence[int]]) -> Judged:
+def judged(problem: Problem, fitted: Fitted, validation: Sequence[Dataset], groups: Sequence[Sequence[int]]) -> Judged:
     """Judge an explanation by recordings that were kept from it, or without such by leaving conditions out in turn."""
     every = range(len(problem.dataset))
     left = sum(b.normal()[2] for b in fitted.blocks)
@@ -37,17 +37,17 @@ def judged(problem: Problem, fitted: Fitted, kept: Sequence[Dataset], groups: Se
     )
     held = held_out(fitted, groups)
     rows = [(e.name, float(v)) for e, v in zip(problem.dataset, held.nrmse, strict=True)]
-    if not kept:
+    if not validation:
         scores = {"training": train, "held_out": replace(train, nrmse=held.total)}
         return Judged(scores=scores, held=held, by_recording=tuple(rows))
-    other = Problem(kept)
+    other = Problem(validation)
     align(other)
     apart = predicted(other, fitted)
     if apart is None:
         return Judged(scores={"training": train}, held=held, by_recording=tuple(rows))
     held = held_out(apart, [])
-    rows += [(e.name, float(v)) for e, v in zip(kept, held.nrmse, strict=True)]
-    score = _score([_rated(other, apart, r) for r in range(len(kept))], held.total)
+    rows += [(e.name, float(v)) for e, v in zip(validation, held.nrmse, strict=True)]
+    score = _score([_rated(other, apart, r) for r in range(len(validation))], held.total)
     return Judged(scores={"training": train, "held_out": score}, held=held, by_recording=tuple(rows))
 
 

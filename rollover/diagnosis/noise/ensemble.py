@@ -47,7 +47,7 @@ TUNING = SETTINGS.noise.ensemble
 def with_sample_weights(e: Dataset, perturbed: Sequence[Mapping[str, Array]]) -> Dataset:
     """The evidence with each sample's weight (D3); `perturbed` are the neighbours' deviations at its stamps."""
     first_impact = first_impact_of(e.simulator)
-    perturbed = neighbours_on_same_course(e, perturbed, first_impact)
+    perturbed = without_diverged(e, perturbed, first_impact)
     if not perturbed:
         return e
     signals = tuple(_weighted(e, s, np.stack([d[s.channel][s.rows] for d in perturbed])) for s in e.signals)
@@ -57,10 +57,10 @@ def with_sample_weights(e: Dataset, perturbed: Sequence[Mapping[str, Array]]) ->
     )
 
 
-def neighbours_on_same_course(
+def without_diverged(
     e: Dataset, perturbed: Sequence[Mapping[str, Array]], first_impact: float
 ) -> list[Mapping[str, Array]]:
-    """Neighbours without those that took a clearly other course after the `first_impact` (s): (D9) is for these."""
+    """Perturbed runs without those that diverge clearly after the `first_impact` (s): (D9) is for the others."""
     late = [(s, s.rows[e.recording.time[s.rows] >= first_impact]) for s in e.signals]
     power = [sum(float(np.nansum((d[s.channel][rows] / s.sigma) ** 2)) for s, rows in late) for d in perturbed]
     most = TUNING.outlier_power * float(np.median(power)) if power else 0.0
@@ -189,13 +189,13 @@ def gained(less: Array, slope: float) -> Array:
     return np.asarray(-TUNING.state_size * np.log1p(-within / TUNING.state_size) + (less - within) / slope)
 
 
-def took_other_course(found: HeavyTail | None) -> bool:
-    """Whether a recording took a clearly other course than its run."""
+def has_diverged(found: HeavyTail | None) -> bool:
+    """Whether a recording diverges clearly from its run after an impact."""
     return found is not None and found.share < TUNING.other_course
 
 
-def p_value_of_other_courses(others: int, of: int) -> float:
-    """p-value of so many recordings that took another course, where each may in `other_course_rate` of all cases."""
+def p_value_of_divergence(others: int, of: int) -> float:
+    """p-value of so many recordings that diverge, where each may in `other_course_rate` of all cases."""
     from scipy.special import bdtrc
 
     return float(bdtrc(others - 1, of, TUNING.other_course_rate)) if others else 1.0

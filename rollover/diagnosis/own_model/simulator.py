@@ -119,7 +119,7 @@ class ModelSimulator:
         del changes, shift, parts
         return []
 
-    def settle(self) -> None:
+    def choose_medoid(self) -> None:
         """See `Simulator`."""
 
     def until(self, n: int) -> ModelSimulator:

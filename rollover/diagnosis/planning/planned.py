@@ -14,7 +14,7 @@ from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
-from rollover.recording.record import Doubt
+from rollover.recording.record import StandardUncertainty
 from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ class Instruments:
     rate: float = TUNING.rate
     tolerance: float = 0.0
     gain: float = TUNING.gain
-    uncertain: Mapping[str, Doubt] = field(default_factory=dict)
+    uncertain: Mapping[str, StandardUncertainty] = field(default_factory=dict)
 
 
 def planned(scenario: Scenario, conditions: Mapping[str, Any], instruments: Instruments) -> Dataset | None:

@@ -240,7 +240,7 @@ def verdict_on(problem: Problem, found: Explanation, groups: Groups, phases: Pha
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
     is_whole = (
         is_whole
-        and not (ahead > SETTINGS.selection.forward_step.nearly_noise and takes_little(found, groups))
+        and not (ahead > SETTINGS.selection.forward_step.nearly_noise and explains_little(found, groups))
         and not is_curved
     )
     # what a tolerance allows has structure too
@@ -266,7 +266,7 @@ def verdict_on(problem: Problem, found: Explanation, groups: Groups, phases: Pha
     return found.refused(), verdict
 
 
-def takes_little(found: Explanation, groups: Groups, share: float = TUNING.little_share) -> bool:
+def explains_little(found: Explanation, groups: Groups, share: float = TUNING.little_share) -> bool:
     """Whether an explanation takes less than a share of what was beyond the noise in held-out recordings."""
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
     return start**2 - ahead**2 < share * (start**2 - 1.0)

@@ -15,7 +15,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, physical, same_family
 from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.inference.intervals import intervals
-from rollover.diagnosis.noise.ensemble import p_value_of_other_courses, took_other_course
+from rollover.diagnosis.noise.ensemble import has_diverged, p_value_of_divergence
 from rollover.diagnosis.result import Interval
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value
 from rollover.diagnosis.selection.screening import initial_time_shifts
@@ -54,7 +54,7 @@ def with_full_weights(problem: Problem, fitted: Fitted) -> Fitted:
     problem.heavy_tailed = True
     found = problem.again(fitted)
     if (
-        p_value_of_other_courses(sum(took_other_course(b.heavy_tail) for b in found.blocks), len(found.blocks))
+        p_value_of_divergence(sum(has_diverged(b.heavy_tail) for b in found.blocks), len(found.blocks))
         > SETTINGS.noise.ensemble.other_course_p_value
     ):
         return found

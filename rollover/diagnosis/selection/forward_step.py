@@ -18,9 +18,9 @@ from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.restarts import (
-    begun_otherwise,
     best_of_each,
     continued_from,
+    from_other_starts,
     with_shapes,
     with_time_shifts,
 )
@@ -71,7 +71,7 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
         fits += _restarted_from_base(inquiry, base, fits, looked)
     fits.sort(key=lambda f: f.left)
     if not problem.effort.is_ensemble:
-        fits = begun_otherwise(inquiry, base, fits, looked, shifts)
+        fits = from_other_starts(inquiry, base, fits, looked, shifts)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
     able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < TUNING.polished_misfit * fits[0].left]
     alone = [f for f in able[:1] if f is fits[0] and not base.effects]

@@ -145,13 +145,13 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
         ]
         met = sorted((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.left)[:most]
         short = [(f.candidates, f.x) for f in met]
-    if not met or _takes_little(problem.again(lead), met[0], few):
+    if not met or _explains_little(problem.again(lead), met[0], few):
         return None
     tasks = [Task(candidates=f.candidates, start=f.x, shifts=completed_shifts(shifts, f, few)) for f in met]
     fits = [f for f in inquiry.fits(tasks) if f is not None]
     if not fits:
         return None
-    best = min([*fits, *_in_tune(inquiry, fits), *_traced(inquiry, fits)], key=lambda f: f.left)
+    best = min([*fits, *_with_secondary_fitted(inquiry, fits), *_traced(inquiry, fits)], key=lambda f: f.left)
     best = min([best, *_mirrored(inquiry, best)], key=lambda f: f.left)
     if best.left < SETTINGS.fit.local_search.abandon_above * taken[-1].fitted.left:
         ways = (best, problem.again(first_effect_last(best)))
@@ -193,7 +193,7 @@ def _with_thresholds_scanned(
     return [((*base[0], a, c), x) for (a, _, c), x in each if x is not None]
 
 
-def _takes_little(lead: Fitted, pair: Fitted, few: Sequence[int]) -> bool:
+def _explains_little(lead: Fitted, pair: Fitted, few: Sequence[int]) -> bool:
     """Whether a pair fitted to few recordings takes next to nothing of what its lead alone leaves beyond the noise.
 
     Where that is little itself none does for sure: the place of a threshold decides, and is looked for later.
@@ -205,7 +205,7 @@ def _takes_little(lead: Fitted, pair: Fitted, few: Sequence[int]) -> bool:
     )
 
 
-def _in_tune(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
+def _with_secondary_fitted(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
     """Pairs of which one effect rings, with its shape fitted too.
 
     With a wrong share of the nose all that stands beside it is met as badly, and the wrong one may lead.

@@ -33,10 +33,10 @@ TUNING = SETTINGS.selection.restarts
 FOLLOWED: tuple[How, ...] = ("polish", "time")  # how what rings is gone on with
 
 
-def begun_otherwise(
+def from_other_starts(
     inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]
 ) -> list[Fitted]:
-    """The fits, best first, with those that another beginning or another shape makes of what did not come far."""
+    """The fits, best first; those that gained little are begun again from other starts and with other shapes."""
     count = sum(b.residual.size for b in base.blocks)
     if fits[0].left > TUNING.rugged_above**2 * count:
         return _refit_on_few(inquiry, base, _damping_frequency_scan(inquiry, fits, looked, shifts), looked, shifts)

@@ -16,7 +16,7 @@ from rollover.diagnosis.fit.step import Phases, Step
 from rollover.diagnosis.fit.time_shift import is_explained_by_clocks
 from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
-from rollover.diagnosis.noise.ensemble import took_other_course
+from rollover.diagnosis.noise.ensemble import has_diverged
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.ensemble_validation import (
     ensemble_validated,
@@ -215,7 +215,7 @@ def with_other_weighting(inquiry: Inquiry, current: Fitted) -> Step | None:
     """
     problem = inquiry.problem
     before = problem.heavy_tailed
-    if before and sum(took_other_course(b.heavy_tail) for b in current.blocks) < TUNING.most_other_courses:
+    if before and sum(has_diverged(b.heavy_tail) for b in current.blocks) < TUNING.most_other_courses:
         return None
     problem.heavy_tailed = not before
     base = problem.again(current)

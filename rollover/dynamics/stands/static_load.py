@@ -159,10 +159,10 @@ class StaticControl:
 
     def _reached(self, now: float, how: str, way: float, force: float, energy: float) -> None:
         x, y = np.array(self.curve).T
-        kept, last = [], -np.inf
+        thinned, last = [], -np.inf
         for a, b in zip(x.tolist(), y.tolist(), strict=True):
             if a >= last + RECORDED:
-                kept.append([a, b])
+                thinned.append([a, b])
                 last = a
         self.found[-1] |= {
             "status": how,
@@ -171,7 +171,7 @@ class StaticControl:
             "deflection": way,
             "force": force,
             "peak_force": float(y.max()),
-            "curve": [*kept, [way, force]],
+            "curve": [*thinned, [way, force]],
         }
         load = self.loads[self.next - 1]
         detail = f"{load.name} {how}: {energy:.0f} J, {1e3 * way:.0f} mm, {1e-3 * force:.1f} kN"

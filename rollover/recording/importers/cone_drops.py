@@ -123,8 +123,8 @@ def _drop(file: Path, name: str, rows: Array) -> Recording:
     check_time(file, rows[:, 0])
     check_values(file, f"{name}, axial", rows[:, 1])
     about = rows[(rows[:, 0] > WINDOW[0]) & (rows[:, 0] < WINDOW[1])]
-    kept = about[about[:, 1] < CLIPPED]
-    if not len(kept):
+    unclipped = about[about[:, 1] < CLIPPED]
+    if not len(unclipped):
         message = f"{name}: nothing from {WINDOW[0]:g} to {WINDOW[1]:g} s about the impact that is not clipped"
         raise InputError(Fault(file=str(file), message=message))
     half = math.radians(12.5 if angle == 12 else angle)
@@ -155,16 +155,16 @@ def _drop(file: Path, name: str, rows: Array) -> Recording:
     return Recording(
         title=f"Cone of {math.degrees(half):g} deg with {NAMED[kind]}, dropped {height:g} m, no. {match[4]}",
         source=CONE_DROPS.source,
-        time=kept[:, 0].copy(),
+        time=unclipped[:, 0].copy(),
         # 0 in free fall: what the water does to the body; coordinate acceleration is that less gravity
-        channels={AXIAL: kept[:, 1] * G - GRAVITY},
+        channels={AXIAL: unclipped[:, 1] * G - GRAVITY},
         conditions=conditions,
         uncertainty=uncertainty,
         clock=Clock(zero="known", within=WITHIN),
         notes=(
             f"rows from {1e3 * WINDOW[0]:g} to {1e3 * WINDOW[1]:g} ms about the impact; {len(rows) - len(about)} others"
             " left out",
-            f"{len(about) - len(kept)} rows above {CLIPPED:.4g} g cut out: the accelerometer clips at {CLIPS} g",
+            f"{len(about) - len(unclipped)} rows above {CLIPPED:.4g} g cut out: the accelerometer clips at {CLIPS} g",
             "two lateral axes left out: a drop along its axis says nothing of them",
             f"the accelerometer sits in the body of {BODY} kg, not in the nose; between them {NAMED[kind]}",
             f"nose, with what lies between: {1.0 - BODY / mass:.4f} of the mass",

@@ -64,7 +64,7 @@ def _entry(file: Path) -> Recording:
     contact = float(fine.time[met[0]])
     fall = contact - float(fine.time[held[-1]])
     rows = (fine.time > contact + WINDOW[0]) & (fine.time < contact + WINDOW[1])
-    kept = rows & (np.abs(fine.values) < 0.97 * CLIPS)
+    usable = rows & (np.abs(fine.values) < 0.97 * CLIPS)
     conditions: dict[str, Any] = {"initiation.speed": GRAVITY * fall}
     nose = "a hemisphere, which no scenario has: its area grows as that of no cone"
     if match[3] is not None:
@@ -81,9 +81,9 @@ def _entry(file: Path) -> Recording:
     return Recording(
         title=f"Water entry at {match[1]} m/s, {match[2]}, no. {match[4]}",
         source=IMPACK.source,
-        time=fine.time[kept] - contact,
+        time=fine.time[usable] - contact,
         # upwards positive, +1 g at rest: what holds it up; coordinate acceleration is that less gravity
-        channels={"striker/acceleration_z": read[kept] * G - GRAVITY},
+        channels={"striker/acceleration_z": read[usable] * G - GRAVITY},
         conditions=conditions,
         uncertainty={"initiation.speed": SPEED},
         clock=Clock(zero="known", within=WITHIN),
@@ -92,7 +92,7 @@ def _entry(file: Path) -> Recording:
             "the mass is not stated with the files: set vehicle.mass to that of the impactor",
             f"speed at contact {GRAVITY * fall:.3f} m/s from {fall:.4f} s of free fall, without air",
             f"{FINE}: {offset:.3f} g taken off, so that it reads 0 in free fall; the slower one follows 1 ms late",
-            f"{int(np.sum(rows & ~kept))} clipped rows cut out; {int(np.sum(~rows))} rows left out: those more than"
+            f"{int(np.sum(rows & ~usable))} clipped rows cut out; {int(np.sum(~rows))} rows left out: those more than"
             f" {1e3 * WINDOW[1]:g} ms from the contact",
             "lateral axes, rotation, pressure, temperature and light left out: a drop along its axis says nothing of"
             " them; all are read with --as ide and a profile",

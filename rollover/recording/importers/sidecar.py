@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 from ground.quantity import Quantity, parameters
-from rollover.recording import Clock, Doubt, Sensor
+from rollover.recording import Clock, Sensor, StandardUncertainty
 from rollover.recording.importers.conditions import ByFile, ConditionsFrom, read_by_file
 from rollover.recording.record import CFC
 from rollover.recording.text_rows import WHITESPACE
@@ -126,7 +126,7 @@ class Sidecar:
 
     def validate(self) -> None:
         """Refuse an uncertainty that is none."""
-        doubts_of(self.uncertainty)
+        uncertainties_of(self.uncertainty)
 
 
 @parameters
@@ -150,7 +150,7 @@ class Profile:
 
     def validate(self) -> None:
         """Refuse an uncertainty that is none."""
-        doubts_of(self.uncertainty)
+        uncertainties_of(self.uncertainty)
 
 
 def schema(kind: type[Sidecar] | type[Profile], title: str) -> dict[str, Any]:
@@ -158,9 +158,9 @@ def schema(kind: type[Sidecar] | type[Profile], title: str) -> dict[str, Any]:
     return document.schema(kind, title, entries={"channels": Column})
 
 
-def doubts_of(uncertainty: Mapping[str, Any]) -> dict[str, Doubt]:
+def uncertainties_of(uncertainty: Mapping[str, Any]) -> dict[str, StandardUncertainty]:
     """Standard deviation by scenario path. Raises ``ValueError`` for what is none."""
-    found: dict[str, Doubt] = {}
+    found: dict[str, StandardUncertainty] = {}
     for path, given in uncertainty.items():
         numbers = tuple(given) if isinstance(given, (list, tuple)) else (given,)
         for value in numbers:

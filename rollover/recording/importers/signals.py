@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rollover.recording import Clock, Recording
 from rollover.recording.importers import stamps
-from rollover.recording.importers.sidecar import DATE_TIME, Column, Described, Profile, Sidecar, doubts_of
+from rollover.recording.importers.sidecar import DATE_TIME, Column, Described, Profile, Sidecar, uncertainties_of
 from rollover.recording.importers.soundness import Line, check_time, check_values
 from rollover.spec.channels import factor, is_known
 from rollover.system.errors import Fault, InputError, nearest
@@ -122,7 +122,7 @@ def assemble(
         channels=table,
         source=about.source,
         conditions=dict(about.conditions),
-        uncertainty=doubts_of(about.uncertainty),
+        uncertainty=uncertainties_of(about.uncertainty),
         clock=about.clock if not origin or "clock" in by.stated else Clock(zero="unknown"),
         notes=(*about.notes, *origin, *notes, *_of_columns(signals, by), *_not_read(signals, by)),
         noise={

@@ -6,11 +6,13 @@ import functools
 import json
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
 from ground.quantity import Label
+from rollover.spec.document.overlaid import breaker
 from rollover.spec.document.slot import Slot, slot_of, slots
 from rollover.spec.document.tree import Node, Place
 from rollover.system.errors import Fault, InputError, hint
@@ -22,17 +24,32 @@ _FIELD_FIRST = re.compile(r"([A-Za-z_][\w.]*): (.*)", re.DOTALL)
 def check(node: Node, kind: Any) -> Any:
     """Build the object that a tree describes; `kind` is a parameter class or an annotation. Raises `InputError`."""
     try:
-        # JSON rather than Python values: strict there means no text for a number, yet lists may stand for tuples
-        return adapter(kind).validate_json(json.dumps(node.plain))
+        return _validated(node, kind)
     except ValidationError as e:
         slot = slot_of(kind)
-        faults = [_fault(node, slot, error) for error in e.errors(include_url=False)]
+        faults = [_fault(node, slot, error, kind) for error in e.errors(include_url=False)]
         # one line each, in the order of the file; a list that lacks two elements says so once
         unique = dict.fromkeys(sorted(faults, key=lambda f: (f.file or "", f.line or 0)))
         raise InputError(*unique) from None
     except ArithmeticError:  # of a rule that works with the numbers, each of which is allowed by itself
         message = "numbers that cannot be worked out together, too large or too small; those of a machine are needed"
         raise node.place.fault("", message) from None
+
+
+def _validated(node: Node, kind: Any) -> Any:
+    # JSON rather than Python values: strict there means no text for a number, yet lists may stand for tuples
+    return adapter(kind).validate_json(json.dumps(node.plain))
+
+
+def _holds(node: Node, kind: Any, location: tuple[Any, ...]) -> bool:
+    """Whether nothing is wrong at a location and below."""
+    try:
+        _validated(node, kind)
+    except ValidationError as e:
+        return not any(error["loc"][: len(location)] == location for error in e.errors(include_url=False))
+    except ArithmeticError:
+        return False
+    return True
 
 
 def adapter(kind: Any) -> TypeAdapter[Any]:
@@ -68,11 +85,12 @@ def _open_tables(slot: Slot) -> tuple[Any, ...]:
     return tuple(found)
 
 
-def _fault(node: Node, slot: Slot, error: Any) -> Fault:
+def _fault(node: Node, slot: Slot, error: Any, kind: Any) -> Fault:
     where = _Where(node, slot).follow(error["loc"])
     reason, ctx = error["type"], error.get("ctx", {})
     if reason == "value_error":
-        return where.broken_rule(str(ctx["error"]))
+        holds = functools.partial(_holds, kind=kind, location=error["loc"])
+        return _of_rule(where, str(ctx["error"]), breaker(node, tuple(where.steps), holds))
     if reason in ("missing", "missing_keyword_only_argument"):
         return where.missing()
     if reason in ("unexpected_keyword_argument", "extra_forbidden"):
@@ -113,6 +131,15 @@ def _fault(node: Node, slot: Slot, error: Any) -> Fault:
     return where.fault(f"{sentence}, got {_got(where.node)}; {where.slot.allowed()} is allowed{spelling}")
 
 
+def _of_rule(where: _Where, sentence: str, own: Place | None) -> Fault:
+    """A broken rule at the key that broke it, `own`, with where else the value stands that the sentence is about."""
+    fault = where.broken_rule(sentence)
+    if own is None or own.file == fault.file:
+        return fault
+    beside = "" if fault.line is None else f" ({fault.path or 'the rest'} stands in {fault.file}:{fault.line})"
+    return replace(fault, file=own.file, line=own.line, message=fault.message + beside)
+
+
 def _spelling(value: Any) -> str:
     """How a number has to be written, for text that was meant as one."""
     number = _NUMBER_FIRST.match(value) if isinstance(value, str) else None
@@ -128,6 +155,7 @@ class _Where:
         self.node, self.slot = node, slot
         self.place: Place = node.place
         self.path: list[str] = []
+        self.steps: list[str | int] = []  # the same as the tree has them
         self.rest = ""  # last step of the location, where nothing stands
 
     def follow(self, location: tuple[Any, ...]) -> _Where:
@@ -153,6 +181,7 @@ class _Where:
                     self.place = below.key if below else self.node.key
                 break
             self.path.append(_address(below, step))
+            self.steps.append(step)
             self.node, self.slot, self.place = below, inner, below.place
         return self
 

@@ -123,15 +123,16 @@ def expand(node: Node, slot: Slot, chain: tuple[Path, ...], path: str = "", unde
             message = f"not a file name, got {base.plain!r}; a .yaml file or the name of a shipped one is needed"
             raise base.place.fault(_join(path, BASE), message)
         under = _included(base, slot, chain, _join(path, BASE))
+    has_base = under is not None
     if under is None or not isinstance(under.value, Mapping) or (node.kind or under.kind) != under.kind:
         under = replace(node, value={})
     assert isinstance(under.value, Mapping)
     kind = node.kind or under.kind
     merged = dict(under.value)
     for key, child in below.items():
-        merged[key] = expand(
-            child, slot.child(key, kind) or Slot(type=object), chain, _join(path, key), under.value.get(key)
-        )
+        before = under.value.get(key)
+        found = expand(child, slot.child(key, kind) or Slot(type=object), chain, _join(path, key), before)
+        merged[key] = replace(found, laid=child.key, over=before) if has_base else found
     return replace(node, value=merged)
 
 
@@ -153,7 +154,8 @@ def _over_list(node: Node, slot: Slot, chain: tuple[Path, ...], path: str, eleme
             known = [str(i) if name is None else name for i, name in enumerate(names)]
             raise child.key.fault(_join(path, key), f"no such element, got {key!r}; {hint(key, known)}")
         inner = slot.element(index) or Slot(type=object)
-        merged[index] = expand(child, inner, chain, _join(path, key), merged[index])
+        found = expand(child, inner, chain, _join(path, key), merged[index])
+        merged[index] = replace(found, laid=child.key, over=merged[index])
     return replace(node, value=tuple(merged))
 
 

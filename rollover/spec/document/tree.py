@@ -43,11 +43,16 @@ class Place:
 
 @dataclass(frozen=True, kw_only=True)
 class Node:
-    """A value with its place; `key` is the place of the key that it stands under."""
+    """A value with its place; `key` is the place of the key that it stands under.
+
+    Of a value in a mapping that lies over a base, `laid` is the place of its key there and `over` what it replaces.
+    """
 
     value: Scalar | Mapping[str, Node] | tuple[Node, ...]
     place: Place
     key: Place
+    laid: Place | None = None
+    over: Node | None = None
 
     @property
     def plain(self) -> Any:
