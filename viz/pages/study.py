@@ -205,7 +205,7 @@ def _reliability(found: Mapping[str, Any]) -> Section:
 
 def _worst(worst: Mapping[str, Any]) -> Section:
     said = ", ".join(f"{name} = {_end(value)}" for name, value in worst["axes"].items())
-    text = f"Point {worst['point']}: {said}. It stands in {worst['file']}; `rollover run {worst['file']}` repeats it."
+    text = f"Point {worst['point']}: {said}. It stands in {worst['file']}; rollover run {worst['file']} repeats it."
     return Section(title="The worst case", blocks=[Note(text=text)])
 
 
