@@ -38,12 +38,14 @@ class Interval:
 class Profile:
     """The misfit along one parameter, all the others fitted anew at each place.
 
-    `places` (n,) in `u`, rising; `rises` (n,) of the squared residual over `widening`: 0 at the fit, 3.84 where a 95 %
-    interval ends. `sigma` in `u`: the parabola of the quadratic interval is ((u - fit)/sigma)^2.
+    `places` (n,) in `u`, rising; `rises` (n,) of the squared residual over `widening`: 0 at the `fit`, below it where
+    the fit is not the least, 3.84 where a 95 % interval ends. `sigma` in `u`: the parabola of the quadratic interval is
+    ((u - fit)/sigma)^2.
     """
 
     places: Array
     rises: Array
+    fit: float
     sigma: float
 
 
@@ -163,10 +165,10 @@ def _profile(
                 continue
             guess = _conditional(objective, u, i, place, along, guess)
             r = objective.residuals(guess)
-            found[place] = max(float(r @ r) - least, 0.0) / widening
+            found[place] = (float(r @ r) - least) / widening
     places = np.array(sorted(found))
     rises = np.array([found[place] for place in places.tolist()])
-    return Profile(places=places, rises=rises, sigma=float(np.sqrt(covariance[i, i])))
+    return Profile(places=places, rises=rises, fit=float(u[i]), sigma=float(np.sqrt(covariance[i, i])))
 
 
 def _end(

@@ -20,6 +20,7 @@ from viz.figures.plots import Curve, Level
 from viz.pages.page import render
 
 OPEN = 4  # figures of curves that are not folded away
+BELOW = 0.1  # of chi-squared: less is the roughness of contacts that fall between two steps or not
 CHI2_95 = 3.841458820694124  # 1.96^2, of chi-squared with one degree of freedom
 
 
@@ -142,16 +143,13 @@ def _profiles(c: Calibration) -> list[Block]:
     """Of each parameter how the misfit rises beside its value, the others fitted anew, and the parabola of it."""
     figures: list[Block] = []
     for p, e, found in zip(c.parameters, c.estimates, c.profiles, strict=False):
-        fit = float(found.places[np.argmin(found.rises)])
         places = np.linspace(found.places[0], found.places[-1], 81)
-        # the root of the rise is nearly a straight line, so that few places tell the curve
-        roots = np.sign(found.places - fit) * np.sqrt(found.rises)
-        profile = pchip_interpolate(found.places, roots, places) ** 2 if len(found.places) > 1 else 0.0 * places
+        profile = pchip_interpolate(found.places, found.rises, places) if len(found.places) > 1 else 0.0 * places
         values = np.array([p.value(float(u)) for u in places])
         svg = plots.xy(
             [
                 Curve(name="others fitted anew", x=values, y=profile),
-                Curve(name="quadratic", x=values, y=((places - fit) / found.sigma) ** 2, role="muted"),
+                Curve(name="quadratic", x=values, y=((places - found.fit) / found.sigma) ** 2, role="muted"),
             ],
             across=f"{p.path}{', ' if _unit(p.unit) else ''}{_unit(p.unit)}",
             label="rise of the squared misfit",
@@ -159,7 +157,11 @@ def _profiles(c: Calibration) -> list[Block]:
             points=[("", p.value(float(u)), float(y)) for u, y in zip(found.places, found.rises, strict=True)],
         )
         text = f"{e.path}: {e.low:.5g} to {e.high:.5g} {_unit(e.unit)}".strip()
-        figures.append(Figure(svg=svg, caption=f"{text}, {e.method} interval; dots were calculated."))
+        lowest = int(np.argmin(found.rises))
+        below = ""
+        if found.rises[lowest] < -BELOW:
+            below = f" At {p.value(float(found.places[lowest])):.5g} it lies below the fit, which is not the best one."
+        figures.append(Figure(svg=svg, caption=f"{text}, {e.method} interval; dots were calculated.{below}"))
     if not figures:
         return []
     note = (
