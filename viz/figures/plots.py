@@ -359,11 +359,11 @@ def finish(axes: Any, across: str, label: str, *, margins: tuple[float, float], 
         )
 
 
-def shades(low: str, high: str) -> Any:
-    """Colour map from one colour to another."""
+def shades(*colours: str) -> Any:
+    """Colour map from one colour to the next."""
     from matplotlib.colors import LinearSegmentedColormap
 
-    return LinearSegmentedColormap.from_list("rollover", [low, high])
+    return LinearSegmentedColormap.from_list("rollover", list(colours))
 
 
 class _Svg:

@@ -181,7 +181,7 @@ def _correlation(c: Calibration, names: list[str]) -> Figure:
     """Correlation of every two estimates as a map."""
     labels = np.array([name for name in names for _ in names], dtype=object)
     across = np.array(names * len(names), dtype=object)
-    svg = heat_map(across, labels, c.correlation.ravel(), across="", up="", label="correlation")
+    svg = heat_map(across, labels, c.correlation.ravel(), across="", up="", label="correlation", signed=True)
     return Figure(svg=svg, caption="Correlation of the estimates: near +1 or -1, two of them are known together only.")
 
 
