@@ -1,12 +1,13 @@
 """The documentation site: `python docs/build.py [FOLDER]` collects pages, adds the reference, and builds them strict.
 
 Pages stay where they are read in the repository; what is built is a copy in which links to files that are no page are
-plain text. No network is needed: theme and search come with the packages.
+plain text. Notebooks among them are run. No network is needed: theme and search come with the packages.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import shutil
 import sys
@@ -21,7 +22,7 @@ HERE = ROOT / "docs"
 SITE = {  # caption -> pages, in the order of the menu
     "Tutorials": [
         f"docs/tutorials/{n}"
-        for n in ("first_overturn", "own_tractor", "design_load", "logger_data", "own_model", "ci_gate")
+        for n in ("first_overturn", "notebook", "own_tractor", "design_load", "logger_data", "own_model", "ci_gate")
     ],
     "How to": [
         "docs/how_to_add",
@@ -113,6 +114,7 @@ def build(site: Path) -> int:
     source.mkdir(parents=True)
     stage(source)
     strict = ["--fail-on-warning", "--keep-going", "--nitpicky", "--quiet"]
+    os.environ["IPYTHONDIR"] = str(source / "ipython")  # nobody's own start-up files take part in a notebook
     return int(build_main([*strict, "-b", "html", "-c", str(HERE), str(source), str(site)]))
 
 

@@ -42,6 +42,13 @@ class Branches:
         return np.asarray((strength / self.first) ** (-1.0 / n))
 
 
+def _exp(power: float) -> float:
+    try:
+        return math.exp(power)
+    except OverflowError:
+        return math.inf
+
+
 def fit_branches(loads: Sequence[Loading]) -> Branches:
     """K_b1 and the second branch of every drop, the exponent shared."""
     d = len(loads)
@@ -61,7 +68,8 @@ def fit_branches(loads: Sequence[Loading]) -> Branches:
         for j, (z, _, shapes, _) in enumerate(rows):
             u = x[2 * d + 1 + k * j : 2 * d + 1 + k * (j + 1)]
             depth = np.maximum(z + shapes @ (root[j] @ u), 1e-9)
-            first, second = math.exp(x[j]) * depth, math.exp(x[d + j]) * (depth / z_r) ** (1.0 + n)
+            with np.errstate(over="ignore", invalid="ignore"):  # a step too far is not finite, and is shortened
+                first, second = _exp(x[j]) * depth, _exp(x[d + j]) * (depth / z_r) ** (1.0 + n)
             steep = first <= second
             force = np.where(steep, first, second)
             forces.append(force)

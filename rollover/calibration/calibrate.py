@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.calibration.identifiability import Determination, determine
+from rollover.calibration.identifiability import Determination, Profile, determine
 from rollover.calibration.objective import Case, Noise, Objective, Parameter, Simulate, case, check_free
 from rollover.calibration.posterior import Posterior, of_fit
 from rollover.comparison import alignment
@@ -109,6 +109,7 @@ class Calibration:
     warnings: tuple[str, ...]
     parameters: tuple[Parameter, ...] = ()
     posterior: Posterior | None = None
+    profiles: tuple[Profile, ...] = ()
 
     @property
     def draws(self) -> Array:
@@ -160,12 +161,8 @@ def calibrate(
         name: case(scenario, recording, how, name=name, noise=noise, channels=channels)
         for name, recording in everything.items()
     }
-    plain = Objective(
-        cases=tuple(ready[name] for name in recordings),
-        parameters=tuple(parameters),
-        simulate=how,
-        clock_sigma=clock_sigma,
-    )
+    fitted = tuple(ready[name] for name in recordings)
+    plain = Objective(cases=fitted, parameters=tuple(parameters), simulate=how, clock_sigma=clock_sigma)
     given = np.array([p.place(p.start) for p in parameters])
     u, agreeing = _from_starts(plain, given, starts, seed, workers)
     weighted = plain.correlated(u)
@@ -332,6 +329,7 @@ def _calibration(
         starts_agreeing=agreeing,
         warnings=(),
         parameters=final.parameters,
+        profiles=found.profiles,
     )
     return replace(result, warnings=tuple(_warnings(result, fine, beyond)))
 

@@ -17,6 +17,20 @@ from tests.ground.recorded_drops import SPEEDS, TRUTH, recorded
 from tests.ground.reference_drop import solve
 
 
+def test_drops_whose_second_branch_begins_at_once_are_refused_in_words() -> None:
+    """A force that leaps where a hard layer begins: trial steps of the fit go beyond what a number holds."""
+    import rollover as ro
+
+    drops = {
+        f"d{speed}": ro.synthesize(
+            "drop_test", {"initiation.speed": speed}, hidden={"effects.soil-layer.depth": 0.1}, seed=1
+        )
+        for speed in (1.5, 2.0, 3.0)
+    }
+    with pytest.raises(ro.InputError, match="no drop shows the first branch; both are needed"):
+        ro.identify(drops)
+
+
 def values(found: Identified) -> dict[str, float]:
     return {c.name: c.value for c in found.coefficients}
 

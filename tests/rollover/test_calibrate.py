@@ -143,6 +143,12 @@ def test_intervals_of_a_straight_line_are_the_textbook_ones() -> None:
     correlation = expected[0, 1] / math.sqrt(expected[0, 0] * expected[1, 1])
     assert found.correlation[0, 1] == pytest.approx(correlation, abs=1e-3)
     assert found.undetermined == ("", "")
+    for profile, width in zip(found.profiles, half, strict=True):  # of a straight line: the parabola of its interval
+        assert profile.places == pytest.approx(
+            [0.5 + k * width for k in (-1.4, -1.0, -0.5, 0.0, 0.5, 1.0, 1.4)], rel=1e-3
+        )
+        assert profile.rises == pytest.approx(((profile.places - 0.5) * Z95 / width) ** 2, rel=5e-3, abs=1e-6)
+        assert profile.sigma == pytest.approx(width / Z95, rel=1e-3)
 
 
 def test_residuals_beyond_the_noise_widen_the_intervals() -> None:
@@ -177,6 +183,20 @@ def test_a_lopsided_interval_ends_where_the_likelihood_says() -> None:
     assert found.low == pytest.approx(inside[0], abs=0.02 * (inside[-1] - inside[0]))
     assert found.high == pytest.approx(inside[-1], abs=0.02 * (inside[-1] - inside[0]))
     assert found.high - speed.place(3.0) > 1.1 * (speed.place(3.0) - found.low)
+    (profile,) = determine(objective, np.array([speed.place(3.0)])).profiles
+    alone = [float(np.sum(objective.residuals(np.array([u])) ** 2)) for u in profile.places]
+    assert profile.rises == pytest.approx(alone), "with nothing else to fit it is the misfit itself"
+
+
+def test_a_profile_tells_of_a_better_minimum_than_the_fit() -> None:
+    """A fit that stopped short: what lies below it is kept as it is."""
+    mass = Parameter(path="vehicle.mass", start=132.0, low=122.0, high=142.0)
+    objective = _of(line, line(scene())[FORCE], 1.0, mass)
+    short = objective.parameters[0].place(132.15)
+    (profile,) = determine(objective, np.array([short])).profiles
+    assert profile.fit == short
+    assert profile.rises.min() < -0.1
+    assert profile.places[profile.rises.argmin()] == pytest.approx(0.5, abs=0.01)
 
 
 def test_correlated_samples_count_less() -> None:

@@ -31,12 +31,14 @@ BY_CI = "make demo"  # what .ci/run does by itself; here the line that make runs
 COMMANDS = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
 
 
-BLOCK = re.compile(r"(^<!-- not run: .*? -->\n)?^```(\w+)\n(.*?)^```$", flags=re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(
+    r"(^<!-- not run: .*? -->\n)?^```(?:\{code-cell\} )?(\w+)\n(.*?)^```$", flags=re.MULTILINE | re.DOTALL
+)
 RUN = [
     "README.md",
     *(
         f"docs/tutorials/{n}.md"
-        for n in ("first_overturn", "own_tractor", "design_load", "logger_data", "own_model", "ci_gate")
+        for n in ("first_overturn", "notebook", "own_tractor", "design_load", "logger_data", "own_model", "ci_gate")
     ),
     "docs/commands.md",
     "docs/inputs.md",
@@ -209,6 +211,18 @@ def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
     for name in set(rollover_package.__all__) - {"__version__"}:
         assert f"<h2>{name}<" in python, f"{name}: a public name that the reference does not have"
     assert "Path of a YAML file, or a name such as" in python
+    notebook = (tmp_path / "site" / "tutorials" / "notebook.html").read_text()
+    shown = re.findall(r'<div class="cell_output.*?(?=<div class="cell |</section>)', notebook, flags=re.DOTALL)
+    for answer in (
+        "rops/force",
+        "<img",
+        "3600 kg:",
+        "ground/force_normal",
+        "missing-physics",
+        "above 4000 N:",
+        "True ",
+    ):
+        assert any(answer in cell for cell in shown), f"{answer}: not among what the cells answered"
     rops = (tmp_path / "site" / "reference" / "rops.html").read_text()
     assert "upper corner whose deflection is reported" in rops
 

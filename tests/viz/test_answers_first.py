@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rollover.calibration.identifiability import Profile
+from rollover.calibration.objective import Parameter
 from rollover.comparison.misfit import Misfit, misfit
 from rollover.dynamics.result import Run
 from rollover.recording import Recording
@@ -58,7 +60,17 @@ def test_a_calibration_shows_curves_and_correlations(drop: Run) -> None:
         replace(e, path=name, bounds=(0.5, 4.5), low=1.5, high=2.5, value=2.0, unit="kg")
         for e, name in zip(marked.estimates, names, strict=True)
     )
-    c = replace(marked, estimates=estimates, correlation=np.array([[1.0, -0.87], [-0.87, 1.0]]))
+    bent = Profile(places=np.array([0.2, 0.4, 0.6, 0.8]), rises=np.array([9.0, 0.0, 2.0, -1.5]), fit=0.4, sigma=0.1)
+    c = replace(
+        marked,
+        estimates=estimates,
+        correlation=np.array([[1.0, -0.87], [-0.87, 1.0]]),
+        parameters=tuple(
+            Parameter(path=n, start=1.0, low=1.0, high=6.0, unit=u) for n, u in zip(names, ("kg", "1"), strict=True)
+        ),
+        profiles=(bent, replace(bent, rises=np.array([9.0, 0.0, 2.0, 6.0]))),
+        warnings=("d2.0: its clock is off", "of 3 starts none ended where the best did"),
+    )
     before, after = compared(drop, 1.3), compared(drop, 1.02)
     text = calibration.page(c, curves=[(before, after)], command="rollover calibrate")
     order = re.findall(r"<h2>(.*?)</h2>", text)
@@ -70,6 +82,14 @@ def test_a_calibration_shows_curves_and_correlations(drop: Run) -> None:
     second = text[text.index("<h2>Parameters") : text.index("<h2>Correlations")]
     assert "place in the allowed range, %" in second
     assert "vehicle.mass 0.5 to 4.5 kg" in second
+    assert order[2] == "Profile likelihood"
+    profiles = text[text.index("<h2>Profile likelihood") : text.index("<h2>How well")]
+    for word in ("others fitted anew", "quadratic", "95 %", "vehicle.mass, kg", "ground.law.stiffness_scale"):
+        assert f">{word}<" in profiles, word
+    assert profiles.count("lies below the fit") == 1
+    assert "At 4.19" in profiles, "1 * 6^0.8"
+    assert "d2.0: its clock is off." in text, "the name of a recording is not a word"
+    assert "Of 3 starts none" in text
     third = text[text.index("<h2>Correlations") :]
     assert third.index("<svg") < third.index("<table")
     assert ">-0.87<" in third[: third.index("</svg>")].replace("\u2212", "-")

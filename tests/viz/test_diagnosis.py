@@ -129,12 +129,19 @@ def test_the_recording_for_the_viewer(with_after: bool, tmp_path: Path) -> None:
     here = "/two/values/ground_force_normal_kN"
     assert {f"{here}/measured", f"{here}/before", "/answer", "/one/phase"} <= entities
     assert (f"{here}/after" in entities) == with_after
-    at, values = read_column(path, f"{here}/measured", "Scalars:scalars")
+    at, values = read_column(path, f"{here}/measured", "Measurements:values")
     track = overlays()[1].tracks[0]
     assert len(at) == track.time.size + 1  # a gap, marked
     read = np.array([v[0] for v in values])
     assert np.isnan(read).sum() == 1
     assert read[~np.isnan(read)] == pytest.approx(1e-3 * track.measured)
+    _, band = read_column(path, f"{here}/measured", "Measurements:variances")
+    deviations = 1e3 * np.sqrt([v[0] for v, known in zip(band, ~np.isnan(read), strict=True) if known])
+    assert deviations == pytest.approx(track.noise * track.unsure), (
+        "the band is 1 sigma of what the misfit is held against"
+    )
+    _, units = read_column(path, f"{here}/measured", "Measurements:units")
+    assert units == [["kN"]]
     left = read_column(path, "/two/residual/ground_force_normal_kN/before", "Scalars:scalars")[1]
     residual = np.array([v[0] for v in left])
     assert np.nanmax(residual) == pytest.approx(np.max(track.measured - track.before) / 40.0)

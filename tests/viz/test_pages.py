@@ -156,3 +156,46 @@ def test_it_prints_in_full_on_light_paper(kind: str, pages: dict[str, Path], bro
     sheets = {tuple(round(float(x)) for x in m) for m in re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", paper)}
     assert sheets <= {(595, 842), (596, 842)}, "A4 in points"
     context.close()
+
+
+LEAST_LETTERS = 8  # px: two thirds of the 12 px of a caption, as small print is
+BROKEN = """[...document.querySelectorAll("th, td.number")].flatMap(cell => {
+  const walk = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT), found = [];
+  for (let node = walk.nextNode(); node; node = walk.nextNode())
+    for (const word of node.data.matchAll(/[^\\s-]+/g)) {
+      const range = document.createRange();
+      range.setStart(node, word.index); range.setEnd(node, word.index + word[0].length);
+      if (new Set([...range.getClientRects()].map(r => Math.round(r.top))).size > 1) found.push(word[0]);
+    }
+  return found;
+})"""
+
+
+@needs_browser
+@pytest.mark.parametrize("kind", KINDS)
+def test_figures_and_captions_can_be_read_on_a_phone(kind: str, pages: dict[str, Path], browser: Any) -> None:
+    context = browser.new_context(offline=True, viewport={"width": 390, "height": 800})
+    tab = context.new_page()
+    tab.goto(pages[kind].as_uri())
+    letters = tab.evaluate("[...document.querySelectorAll('svg text')].map(e => e.getBoundingClientRect().height)")
+    assert min((h for h in letters if h > 0), default=LEAST_LETTERS) >= LEAST_LETTERS
+    seen = tab.evaluate(
+        "[...document.querySelectorAll('caption span, figcaption')].map(e => e.getBoundingClientRect())"
+        ".filter(r => r.width > 0 && (r.left < 0 || r.right > innerWidth)).length"
+    )
+    assert seen == 0, "captions that only a push to the side shows"
+    wide = tab.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+    assert wide <= 1
+    context.close()
+
+
+@needs_browser
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_number_and_no_heading_is_broken_on_paper(kind: str, pages: dict[str, Path], browser: Any) -> None:
+    width = round(PAPER[0] / 25.4 * 96)
+    context = browser.new_context(offline=True, viewport={"width": width, "height": 900})
+    tab = context.new_page()
+    tab.goto(pages[kind].as_uri())
+    tab.emulate_media(media="print")
+    assert tab.evaluate(BROKEN) == []
+    context.close()

@@ -56,7 +56,7 @@ def test_what_it_says_without_a_script(report: Path) -> None:
     assert "12 of 240 cases failed" in said
     assert "its process ended with exit code -6" in said
     assert ["impact-speed", "228", "100 %", "47.4 %"] in parts.rows
-    assert "`rollover run worst.yaml` repeats it" in said
+    assert "rollover run worst.yaml repeats it" in said
     heading = parts.rows.index(next(row for row in parts.rows if row[:3] == ["point", "speed, m/s", "soil, factor"]))
     first = parts.rows[heading + 1]
     assert first[0] == "0"

@@ -11,6 +11,11 @@ from viz.content.embedded import embedded
 State = Literal["", "pass", "fail", "warn", "muted"]
 
 
+def as_sentence(text: str) -> str:
+    """Text as a sentence begins; a name, a path or a number that it begins with stays as it is."""
+    return text[:1].upper() + text[1:] if text.partition(" ")[0].isalpha() else text
+
+
 @dataclass(frozen=True, kw_only=True)
 class Headline:
     """The answer in a sentence, what it rests on in `detail`, and whether it is good, bad or neither."""

@@ -89,7 +89,8 @@ def confusion(
 
 
 def _open(width: float, height: float, label: str) -> str:
-    size = f'viewBox="0 0 {width:.0f} {height:.0f}" style="max-width:{width:.0f}px" font-size="12"'
+    wide = f"{width:.0f}px"
+    size = f'viewBox="0 0 {width:.0f} {height:.0f}" style="max-width:{wide}; --natural:{wide}" font-size="12"'
     return f'<svg role="img" aria-label="{escape(label)}" {size}>'
 
 

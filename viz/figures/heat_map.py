@@ -12,24 +12,37 @@ from viz.figures.svg import number_label
 
 PAPER, WHITE = "#dfeaf6", "#ffffff"  # of the least value and of numbers on dark cells
 MOST_NUMBERS = 120  # cells up to which each carries its number
+MOST_LETTERS = 36  # side by side below a map: a letter of 9 points is 0.07 inches wide, the map 2.6
 
 
-def heat_map(x: NDArray[Any], y: NDArray[Any], values: NDArray[np.float64], *, across: str, up: str, label: str) -> str:
-    """Cells of equal size at the levels of x and y (n,), numbers or words, coloured by `values` (n,), NaN crossed."""
+def heat_map(
+    x: NDArray[Any],
+    y: NDArray[Any],
+    values: NDArray[np.float64],
+    *,
+    across: str,
+    up: str,
+    label: str,
+    signed: bool = False,
+) -> str:
+    """Cells of equal size at the levels of x and y (n,), numbers or words, coloured by `values` (n,), NaN crossed.
+
+    `signed` values go from -1 to 1, and are the darker the farther they are from 0.
+    """
     columns, rows = (list(dict.fromkeys(sorted(v.tolist()) if v.dtype != object else v.tolist())) for v in (x, y))
     cells = np.full((len(rows), len(columns)), np.nan)
     for a, b, value in zip(x.tolist(), y.tolist(), values, strict=True):
         cells[rows.index(b), columns.index(a)] = value
-    low, high = float(np.nanmin(cells)), float(np.nanmax(cells))
+    low, high = (-1.0, 1.0) if signed else (float(np.nanmin(cells)), float(np.nanmax(cells)))
     with canvas(4.6, 3.2) as (figure, svg):
         axes = figure.add_subplot()
-        colours = shades(PAPER, COLOURS["first"])
+        colours = shades(COLOURS["second"], PAPER, COLOURS["first"]) if signed else shades(PAPER, COLOURS["first"])
         mesh = axes.pcolormesh(cells, cmap=colours, vmin=low, vmax=high, edgecolors=COLOURS["grid"], linewidth=0.4)
         for (i, j), value in np.ndenumerate(cells):
             if not np.isfinite(value):
                 axes.plot([j + 0.5], [i + 0.5], ls="", marker="x", color=COLOURS["limit"])
             elif cells.size <= MOST_NUMBERS:
-                dark = high > low and value > 0.5 * (low + high)
+                dark = high > low and (abs(value) > 0.5 if signed else value > 0.5 * (low + high))
                 axes.text(
                     j + 0.5, i + 0.5, number_label(value, values, 3), ha="center", va="center", fontsize=7,
                     color=WHITE if dark else COLOURS["ink"],
@@ -38,6 +51,10 @@ def heat_map(x: NDArray[Any], y: NDArray[Any], values: NDArray[np.float64], *, a
             step = max(1, -(-len(levels) // 12))
             ticks = [v if isinstance(v, str) else f"{v:.4g}" for v in levels]
             axis.set_ticks([k + 0.5 for k in range(0, len(levels), step)], ticks[::step])
+        if any(isinstance(v, str) for v in columns) and sum(map(len, map(str, columns))) > MOST_LETTERS:
+            axes.tick_params(axis="x", labelrotation=30.0)
+            for tick in axes.get_xticklabels():
+                tick.set(horizontalalignment="right", rotation_mode="anchor")
         bar = figure.colorbar(mesh, ax=axes)
         bar.set_label(label, color=COLOURS["ink"])
         bar.outline.set_visible(False)

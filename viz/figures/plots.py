@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Any, Literal
 
 import numpy as np
@@ -283,8 +284,10 @@ def outlines(views: Sequence[View]) -> str:
                 label = shape.name if shape.name and k == 0 else None
                 axes.plot(p[:, 0], p[:, 1], color=colour, lw=1.3, ls=style, label=label)
             axes.set_aspect("equal", adjustable="datalim")
-            axes.set_title(view.title, fontsize=9, color=COLOURS["ink"])
-            finish(axes, view.across, view.up, margins=(0.06, 0.06), legend=False)
+            # 80 letters of this size are as wide as the figure
+            axes.set_title(fill(view.title, 80 // len(views)), fontsize=9, color=COLOURS["ink"])
+            up = "" if k and view.up == views[k - 1].up else view.up
+            finish(axes, view.across, up, margins=(0.06, 0.06), legend=False)
         handles, labels = figure.axes[0].get_legend_handles_labels()
         unique = dict(zip(labels, handles, strict=True))
         if unique:
@@ -356,11 +359,11 @@ def finish(axes: Any, across: str, label: str, *, margins: tuple[float, float], 
         )
 
 
-def shades(low: str, high: str) -> Any:
-    """Colour map from one colour to another."""
+def shades(*colours: str) -> Any:
+    """Colour map from one colour to the next."""
     from matplotlib.colors import LinearSegmentedColormap
 
-    return LinearSegmentedColormap.from_list("rollover", [low, high])
+    return LinearSegmentedColormap.from_list("rollover", list(colours))
 
 
 class _Svg:

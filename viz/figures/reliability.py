@@ -14,7 +14,7 @@ SIDE, EDGE = 260, 44  # px: the square of 0 to 1, and room for its numbers
 def reliability(bins: Sequence[Mapping[str, Any]]) -> str:
     """``<svg>`` of bins with `given` (mean probability) and `right` (hits, of, share, low, high)."""
     whole = SIDE + 2 * EDGE
-    size = f'viewBox="0 0 {whole} {whole}" style="max-width:{whole}px" font-size="12"'
+    size = f'viewBox="0 0 {whole} {whole}" style="max-width:{whole}px; --natural:{whole}px" font-size="12"'
     found = [f'<svg role="img" aria-label="reliability: given against came true" {size}>']
     for k in range(5):
         at = 0.25 * k

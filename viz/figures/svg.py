@@ -22,7 +22,7 @@ def cleaned(svg: str, colours: Mapping[str, str]) -> str:
     box = re.search(r'viewBox="([^"]*)"', svg)
     assert box is not None
     wide = float(box[1].split()[2]) * 4.0 / 3.0  # px to a pt, so that letters are as large in all figures
-    head = f'<svg role="img" viewBox="{box[1]}" style="max-width: {wide:.0f}px">'
+    head = f'<svg role="img" viewBox="{box[1]}" style="max-width: {wide:.0f}px; --natural: {wide:.0f}px">'
     svg = re.sub(r"<svg[^>]*>", head, svg, count=1)
     svg = re.sub(r"\s*font-family: [^;\"]*;?", "", svg)
     svg = _NUMBER.sub(lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), svg)

@@ -5,20 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.interpolate import pchip_interpolate
 
 from rollover.calibration.calibrate import Calibration, Estimate, Score
 from rollover.calibration.posterior import Posterior
 from rollover.comparison.misfit import Misfit
-from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table
+from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table, as_sentence
 from viz.content.differences import differences_section
 from viz.content.entities import series
 from viz.figures import plots
 from viz.figures.corner import corner
 from viz.figures.heat_map import heat_map
-from viz.figures.plots import Curve
+from viz.figures.plots import Curve, Level
 from viz.pages.page import render
 
 OPEN = 4  # figures of curves that are not folded away
+BELOW = 0.1  # of chi-squared: less is the roughness of contacts that fall between two steps or not
+CHI2_95 = 3.841458820694124  # 1.96^2, of chi-squared with one degree of freedom
 
 
 def page(
@@ -42,7 +45,8 @@ def page(
         *_curves(curves),
         Section(title="Parameters", blocks=[*_spans(c), table]),
     ]
-    blocks += [Note(text=f"{w[:1].upper()}{w[1:]}.", warning=True) for w in c.warnings]
+    blocks += [Note(text=f"{as_sentence(w)}.", warning=True) for w in c.warnings]
+    blocks += _profiles(c)
     scores = [("fitted", c.training), *([("held out", c.held_out)] if c.held_out is not None else [])]
     rows: list[list[str | Cell]] = [
         [which, ", ".join(s.recordings), when, *_scores(score)]
@@ -131,15 +135,53 @@ def _spans(c: Calibration) -> list[Block]:
         np.array([share(e, e.value)[0] for e in c.estimates]),
         label="place in the allowed range, %",
     )
-    ranges = "; ".join(f"{e.path} {e.bounds[0]:.4g} to {e.bounds[1]:.4g} {e.unit}".strip() for e in c.estimates)
+    ranges = "; ".join(f"{e.path} {e.bounds[0]:.4g} to {e.bounds[1]:.4g} {_unit(e.unit)}".strip() for e in c.estimates)
     return [Figure(svg=svg, caption=f"Value and 95 % interval of each parameter in its allowed range ({ranges}).")]
+
+
+def _profiles(c: Calibration) -> list[Block]:
+    """Of each parameter how the misfit rises beside its value, the others fitted anew, and the parabola of it."""
+    figures: list[Block] = []
+    for p, e, found in zip(c.parameters, c.estimates, c.profiles, strict=False):
+        places = np.linspace(found.places[0], found.places[-1], 81)
+        profile = pchip_interpolate(found.places, found.rises, places) if len(found.places) > 1 else 0.0 * places
+        values = np.array([p.value(float(u)) for u in places])
+        svg = plots.xy(
+            [
+                Curve(name="others fitted anew", x=values, y=profile),
+                Curve(name="quadratic", x=values, y=((places - found.fit) / found.sigma) ** 2, role="muted"),
+            ],
+            across=f"{p.path}{', ' if _unit(p.unit) else ''}{_unit(p.unit)}",
+            label="rise of the squared misfit",
+            levels=[Level(name="95 %", value=CHI2_95)],
+            points=[("", p.value(float(u)), float(y)) for u, y in zip(found.places, found.rises, strict=True)],
+        )
+        text = f"{e.path}: {e.low:.5g} to {e.high:.5g} {_unit(e.unit)}".strip()
+        lowest = int(np.argmin(found.rises))
+        below = ""
+        if found.rises[lowest] < -BELOW:
+            below = f" At {p.value(float(found.places[lowest])):.5g} it lies below the fit, which is not the best one."
+        figures.append(Figure(svg=svg, caption=f"{text}, {e.method} interval; dots were calculated.{below}"))
+    if not figures:
+        return []
+    note = (
+        "Squared misfit above its least, over the squared noise, widened as the intervals are; a 95 % interval "
+        "ends where it reaches 3.84."
+    )
+    rest = [Details(summary=f"{len(figures) - OPEN} more values", blocks=figures[OPEN:])] if figures[OPEN:] else []
+    title = "Profile likelihood"
+    return [Section(title=title, blocks=[*figures[:OPEN], *rest, Note(text=note)])]
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else unit
 
 
 def _correlation(c: Calibration, names: list[str]) -> Figure:
     """Correlation of every two estimates as a map."""
     labels = np.array([name for name in names for _ in names], dtype=object)
     across = np.array(names * len(names), dtype=object)
-    svg = heat_map(across, labels, c.correlation.ravel(), across="", up="", label="correlation")
+    svg = heat_map(across, labels, c.correlation.ravel(), across="", up="", label="correlation", signed=True)
     return Figure(svg=svg, caption="Correlation of the estimates: near +1 or -1, two of them are known together only.")
 
 

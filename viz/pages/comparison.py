@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from rollover.comparison.misfit import ChannelMisfit, Misfit
 from rollover.comparison.rating import Iso18571, NotRateable, Rating, SpragueGeers, verdict, worst_verdict
 from rollover.scenario import Scenario
-from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, State, Table
+from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, State, Table, as_sentence
 from viz.content.differences import differences_section
 from viz.content.entities import series
 from viz.figures import plots
@@ -95,7 +95,7 @@ def _recording(found: Misfit) -> list[Block]:
         for c in found.channels
         if (reason := _reason(c.rating))
     ]
-    blocks += why + [Note(text=f"{line[:1].upper()}{line[1:]}.") for line in sentences(found)]
+    blocks += why + [Note(text=f"{as_sentence(line)}.") for line in sentences(found)]
     rows: list[list[str | Cell]] = [
         [
             c.channel,

@@ -5,7 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Pairs, Section, State, Table
+from viz.content.blocks import (
+    Block,
+    Cell,
+    Details,
+    Figure,
+    Footer,
+    Headline,
+    Note,
+    Pairs,
+    Section,
+    State,
+    Table,
+    as_sentence,
+)
 from viz.figures.counts import Share, confusion, shares
 from viz.pages.page import render
 from viz.pages.proof_real import sections
@@ -55,7 +68,7 @@ def headline(summary: Mapping[str, Any]) -> Headline:
         state = "warn" if alarms["high"] > WRONG else "pass"
     sentence = "; ".join(parts) or f"{summary['cases']} cases"
     text = "; ".join(detail)
-    return Headline(sentence=f"{sentence}.", detail=f"{text[:1].upper()}{text[1:]}." if text else "", state=state)
+    return Headline(sentence=f"{sentence}.", detail=f"{as_sentence(text)}." if text else "", state=state)
 
 
 def _answers(summary: Mapping[str, Any]) -> list[Block]:

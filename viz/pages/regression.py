@@ -23,7 +23,8 @@ def page(answers: Sequence[Answer], *, command: str, scenario_hash: str = "") ->
     elif updated:
         head = Headline(sentence=f"{len(updated)} baselines were written.")
     else:
-        head = Headline(sentence=f"All {len(answers)} scenarios are as they were.", state="pass")
+        all_ = f"All {len(answers)} scenarios are as they were." if len(answers) != 1 else "The scenario is as it was."
+        head = Headline(sentence=all_, state="pass")
     rows: list[list[str | Cell]] = [
         [
             a.scenario,

@@ -39,7 +39,7 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
         if answer["verdict"] != "no verdict"
         else "The static sequence has no verdict.",
         detail=f"{answer['elements']} elements, {answer['segments']} to a member; feet: {answer['base']}.",
-        state="fail" if bad else "warn" if answer["warnings"] else "",
+        state="fail" if bad else "warn" if answer["warnings"] else "pass" if answer["verdict"] == "met" else "",
     )
     blocks: list[Block] = [Section(title="Load over deflection", blocks=[_curves(done), *_results(found)])]
     blocks.append(Section(title="Against the standard", blocks=[_criteria(answer)]))

@@ -12,7 +12,7 @@ from viz.figures import plots
 from viz.figures.plots import Curve, Role
 from viz.pages.page import render
 
-COLUMNS = ("heading, deg", "lift-off", "first off", "free pivot ends", "on the stop", "overturns")
+COLUMNS = ("heading, deg", "lift-off, deg", "first off", "free pivot ends, deg", "on the stop, deg", "overturns, deg")
 CLOSED = ("pivot, outer edge", "pivot, centre line", "stop, outer edge", "stop, centre line", "against stiff tyres")
 WHAT = (
     "Heading in the slope: 0 uphill, 90 with the left side downhill, 180 downhill. Angles are slopes, in degrees. "
@@ -51,7 +51,7 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
         ),
         Section(title="What happens", blocks=[Table(columns=COLUMNS, rows=_events(rows), numeric=(0, 1, 3, 4, 5))]),
         Section(
-            title="Closed forms beside",
+            title="Closed forms beside, degrees",
             blocks=[
                 Table(columns=("heading, deg", *CLOSED), rows=_closed(rows), numeric=range(6)),
                 Note(text=STIFF),

@@ -96,7 +96,8 @@ def _output(study: Study, done: Conducted, account: Mapping[str, Any], output: M
         if output["ends"]:
             blocks.append(_tornado(output, factor, label))
         blocks += _indices(output, factor, unit)
-        blocks += responses(study, done, y, label, levels)
+        along = responses(study, done, y, label, levels)
+        blocks = [*along, *blocks] if study.plan.kind == "grid" else [*blocks, *along]  # a grid is asked for its map
     return Section(title=output["name"], blocks=blocks)
 
 
@@ -123,9 +124,9 @@ def _quantiles(output: Mapping[str, Any], *, drawn: bool) -> Table:
     how = "Intervals by order statistics and Clopper-Pearson." if drawn else "The cases of a plan are no draws."
     missing = f"; {output['missing']} have no such measure" if output["missing"] else ""
     return Table(
-        columns=(f"{output['name']}{known and ','}{known}", "", "interval from", "to"),
-        rows=rows,
-        numeric=(1, 2, 3),
+        columns=(f"{output['name']}{known and ','}{known}", "", "interval from", "to")[: 4 if drawn else 2],
+        rows=rows if drawn else [row[:2] for row in rows],
+        numeric=(1, 2, 3) if drawn else (1,),
         caption=f"{output['cases']} cases{missing}. {how}",
     )
 
@@ -205,7 +206,7 @@ def _reliability(found: Mapping[str, Any]) -> Section:
 
 def _worst(worst: Mapping[str, Any]) -> Section:
     said = ", ".join(f"{name} = {_end(value)}" for name, value in worst["axes"].items())
-    text = f"Point {worst['point']}: {said}. It stands in {worst['file']}; `rollover run {worst['file']}` repeats it."
+    text = f"Point {worst['point']}: {said}. It stands in {worst['file']}; rollover run {worst['file']} repeats it."
     return Section(title="The worst case", blocks=[Note(text=text)])
 
 

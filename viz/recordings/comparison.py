@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from rollover.comparison.misfit import ChannelMisfit, Misfit
 from rollover.comparison.rating import Iso18571, Rating, verdict, worst_verdict
 from rollover.dynamics.result import Run
-from viz.content.entities import CYCLE, MEASURED, PHASE, series
+from viz.content.entities import CYCLE, PHASE, series
+from viz.recordings import band
 from viz.recordings.blueprint import Beside
 from viz.recordings.log import write_rrd
 from viz.recordings.stream import Stream, colour
@@ -47,7 +48,7 @@ def _beside(out: Stream, found: Misfit) -> None:
         out.static(s.simulated, rr.SeriesLines.from_fields(names=[f"{s.legend}, simulated"]))
         out.static(s.residual, residual)
         _measured(out, c)
-        time, values = _broken(c, c.residual / (c.noise or 0.01 * float(np.ptp(c.measured)) or 1.0))
+        time, values = band.broken(c.time, c.residual / (c.noise or 0.01 * float(np.ptp(c.measured)) or 1.0))
         out.columns(s.residual, time, rr.Scalars.columns(scalars=values))
     marks = [(at, phase if phase in PHASE else "impact") for at, phase in found.phases]
     out.static(
@@ -62,23 +63,9 @@ def _beside(out: Stream, found: Misfit) -> None:
 def _measured(out: Stream, c: ChannelMisfit) -> None:
     """The measured curve, with a band of 1 sigma of its noise to each side where that is known."""
     s = series(c.channel)
-    time, values = _broken(c, c.measured * s.factor)
-    look = {"names": [f"{s.legend}, measured"], "colors": colour(MEASURED), "widths": [1.5]}
-    policy = rr.components.AggregationPolicy.MinMax
-    if not c.noise:
-        out.static(s.measured, rr.SeriesLines(**look, aggregation_policy=policy))
-        out.columns(s.measured, time, rr.Scalars.columns(scalars=values))
-        return
-    out.static(s.measured, rr.Measurements.from_fields(**look, units=[s.unit], aggregation_policy=policy))
-    variances = np.full(values.size, (c.noise * s.factor) ** 2)
-    out.columns(s.measured, time, rr.Measurements.columns(values=values, variances=variances))
-
-
-def _broken(c: ChannelMisfit, values: Array) -> tuple[Array, Array]:
-    """Stamps and values with a gap where the recording has one: a line is not drawn over it."""
-    step = np.diff(c.time)
-    breaks = np.flatnonzero(step > 2.5 * float(np.median(step))) + 1
-    return np.insert(c.time, breaks, c.time[breaks] - 1e-6), np.insert(values, breaks, np.nan)
+    band.look(out, s.measured, name=f"{s.legend}, measured", width=1.5, unit=s.unit, is_band=bool(c.noise))
+    sigma = np.full(c.time.size, c.noise * s.factor) if c.noise else None
+    band.rows(out, s.measured, c.time, c.measured * s.factor, sigma)
 
 
 def markdown(found: Misfit) -> str:

@@ -14,6 +14,7 @@ from rollover.diagnosis import Diagnosis
 from rollover.diagnosis.overlay import Overlay, Track
 from viz.content.diagnosis_words import answer, markdown, ranked
 from viz.content.entities import LIMIT, MEASURED, SIMULATED, escaped, series
+from viz.recordings import band
 from viz.recordings.blueprint import framed
 from viz.recordings.saved import saving
 from viz.recordings.stream import Stream, colour
@@ -66,18 +67,19 @@ def _looks(out: Stream, one: Overlay) -> None:
         for source, shade, width in _SOURCES:
             if source == "after" and track.after is None:
                 continue
-            out.static(f"{_path(one, track, 'values')}/{source}", _line(source, shade, width))
-            if source != "measured":
-                name = f"{s.name}, {source}"
-                out.static(f"{_path(one, track, 'residual')}/{source}", _line(name, shade, 1.0))
+            path = f"{_path(one, track, 'values')}/{source}"
+            if source == "measured":
+                band.look(out, path, name=source, width=width, unit=s.unit, is_band=True)
+                continue
+            out.static(path, _line(source, shade, width))
+            out.static(f"{_path(one, track, 'residual')}/{source}", _line(f"{s.name}, {source}", shade, 1.0))
     names = list(PHASES)
     looks = rr.StateConfiguration(values=names, labels=names, colors=colour(*PHASES.values()))
     out.static(f"{escaped(one.recording)}/phase", looks)
 
 
 def _line(name: str, shade: int, width: float) -> Any:
-    policy = rr.components.AggregationPolicy.MinMax  # any other draws a short peak lower than it was
-    return rr.SeriesLines(names=[name], colors=colour(shade), widths=[width], aggregation_policy=policy)
+    return rr.SeriesLines(names=[name], colors=colour(shade), widths=[width], aggregation_policy=band.POLICY)
 
 
 def _recording(out: Stream, one: Overlay) -> None:
@@ -86,21 +88,14 @@ def _recording(out: Stream, one: Overlay) -> None:
         for source, values in (("measured", track.measured), ("before", track.before), ("after", track.after)):
             if values is None:
                 continue
-            _columns(out, f"{_path(one, track, 'values')}/{source}", track.time, values * factor)
+            sigma = factor * track.noise * track.unsure if source == "measured" else None
+            band.rows(out, f"{_path(one, track, 'values')}/{source}", track.time, values * factor, sigma)
             if source != "measured":
                 left = (track.measured - values) / (track.noise * track.unsure)
-                _columns(out, f"{_path(one, track, 'residual')}/{source}", track.time, left)
+                band.rows(out, f"{_path(one, track, 'residual')}/{source}", track.time, left, None)
     marks = [(at, name) for at, name in one.phases if name in PHASES]
     states = rr.StateChange.columns(state=[name for _, name in marks])
     out.columns(f"{escaped(one.recording)}/phase", np.array([at for at, _ in marks]), states)
-
-
-def _columns(out: Stream, path: str, time: np.ndarray[Any, Any], values: np.ndarray[Any, Any]) -> None:
-    """Values with a gap where the recording has one: a line is not drawn over it."""
-    step = np.diff(time)
-    breaks = np.flatnonzero(step > 2.5 * float(np.median(step))) + 1 if step.size else np.array([], dtype=int)
-    at = np.insert(time, breaks, time[breaks] - 1e-6)
-    out.columns(path, at, rr.Scalars.columns(scalars=np.insert(values, breaks, np.nan)))
 
 
 def _blueprint(found: Diagnosis, overlays: Sequence[Overlay]) -> rrb.Blueprint:

@@ -39,6 +39,8 @@ def list_(
     if not rows:
         console.say(f"There are no {what} in this version.")
         return
+    if what == "channels":  # no word for what does not wrap
+        rows = [{**row, "period": f"wraps at {row['period']:.4g}" if row["period"] else ""} for row in rows]
     cells = [[catalogue.text(value) for value in row.values()] for row in rows]
     widths = [min(48, max(map(len, column))) for column in zip(*cells, strict=True)]
     for row in cells:

@@ -160,5 +160,5 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
     updated = sum(a.verdict == "updated" for a in answers)
     verdict = f"{updated} baselines written" if updated else f"{bad} of {len(answers)} scenarios are not as they were"
     if not bad and not updated:
-        verdict = f"all {len(answers)} scenarios are as they were"
+        verdict = f"all {len(answers)} scenarios are as they were" if len(answers) != 1 else "the scenario is as it was"
     out.print(f"{verdict[0].upper()}{verdict[1:]}. Everything: {folder}", style="bold")
