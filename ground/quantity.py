@@ -136,6 +136,17 @@ def _labels(kind: Any) -> tuple[str, ...]:
     return tuple(f.name for f in fields(kind) if any(isinstance(m, Label) for m in _metadata(hints[f.name])))
 
 
+@functools.cache  # parameter classes are few
+def _nullable(kind: Any) -> frozenset[str]:
+    """Fields whose annotation allows None somewhere in it."""
+    hints = typing.get_type_hints(kind, include_extras=True)
+    return frozenset(f.name for f in fields(kind) if _allows_none(hints[f.name]))
+
+
+def _allows_none(annotation: object) -> bool:
+    return annotation is type(None) or any(_allows_none(inner) for inner in typing.get_args(annotation))
+
+
 def _metadata(annotation: Any) -> tuple[Any, ...]:
     return getattr(annotation, "__metadata__", ())
 
@@ -160,7 +171,7 @@ def _check(self: Any) -> None:
             continue  # as nearly all, and a fit makes a hundred thousand of them
         for number in _flat(value):
             if isinstance(number, bool) or not isinstance(number, (int, float)):
-                if number is not None:
+                if number is not None or name not in _nullable(kind):
                     raise ValueError(f"{name}: not a number, got {number!r}; a number in {quantity.unit} is allowed")
             elif not quantity.admits(number):
                 raise ValueError(f"{name}: out of bounds, got {number!r}; {quantity.allowed} is allowed")

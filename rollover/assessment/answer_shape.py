@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
+
+from rollover.system.arguments import is_finite_number
 
 NUMBER, TEXT, COUNT = "a number", "text", "a whole number"
 _PEAK = {
@@ -53,12 +54,7 @@ def misfit_of(value: Any, shape: Any = ANSWER, path: str = "") -> tuple[str, str
 def _is(value: Any, shape: str) -> bool:
     if shape == TEXT:
         return isinstance(value, str)
-    if isinstance(value, bool) or not isinstance(value, int if shape == COUNT else (int, float)):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # a whole number of hundreds of digits
-        return False
+    return is_finite_number(value) and (shape != COUNT or isinstance(value, int))
 
 
 def _got(value: Any) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rollover.recording.record import CLASSES, Clock, Recording, Sensor
 from rollover.recording.tables import numbers, open_parquet
 from rollover.spec.channels import describe
+from rollover.system.arguments import is_finite_number
 from rollover.system.boundary import CURE, worded
 from rollover.system.errors import Fault, InputError
 
@@ -117,7 +117,7 @@ def _check(about: Any) -> None:
     if not set(about.get("cfc", {}).values()) <= {0, *CLASSES}:
         raise TypeError("cfc")
     numbers_of = [*about.get("noise", {}).values(), *about.get("cfc", {}).values()]
-    if not all(isinstance(n, (int, float)) and not isinstance(n, bool) and math.isfinite(n) for n in numbers_of):
+    if not all(is_finite_number(n) for n in numbers_of):
         raise TypeError("noise, cfc")
     if not all(isinstance(note, str) for note in about.get("notes", ())):
         raise TypeError("notes")

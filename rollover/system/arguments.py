@@ -16,9 +16,17 @@ MOST_MEMORY = 1.4e14  # bytes: the 47 bits of address space that a process has
 SEGMENTS = 12  # elements to a member of a frame: forces and energies within 0.5 % of four times as many (tested)
 
 
+def is_finite_number(value: object) -> bool:
+    """Whether something is a number that is finite as one of double precision; True and False are none."""
+    try:
+        return isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value)
+    except OverflowError:  # a whole number of 309 digits and more
+        return False
+
+
 def within(name: str, value: float, least: float, most: float = inf) -> None:
     """Refuse a number that is not finite or outside its bounds. Raises `InputError`."""
-    if not isfinite(value) or not least <= value <= most:
+    if not is_finite_number(value) or not least <= value <= most:
         allowed = f"at least {least:g}" if most == inf else f"{least:g} to {most:g}"
         raise InputError(Fault(path=name, message=f"out of bounds, got {value!r}; {allowed} is allowed"))
 

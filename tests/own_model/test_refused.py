@@ -117,6 +117,15 @@ DECLARED: dict[str, tuple[dict[str, Any], str]] = {
     "a logarithm of nothing": ({"parameters": {"slope": replace(GOOD, scale="log")}}, "no logarithm, got 0"),
     "a null of what is always fitted": ({"parameters": {"slope": replace(GOOD, null=0.0)}}, "a null is a term's"),
     "not a number": ({"parameters": {"slope": replace(GOOD, high=float("inf"))}}, "not a finite number, got inf"),
+    "a number beyond all": ({"parameters": {"slope": replace(GOOD, high=10**400)}}, "not a finite number, got 1000"),
+    "a channel without a name": ({"inputs": {None: Line.inputs[IN]}}, "a name that is no text, got None"),
+    "a unit that is none": ({"outputs": {OUT: Quantity(3.0)}}, f"{OUT}.unit: no text, got 3.0"),  # type: ignore[arg-type]
+    "a term without an id": ({"terms": (replace(TERM, id=None),)}, "terms.0..id: no text, got None"),  # type: ignore[arg-type]
+    "a sentence of bytes": ({"terms": (replace(TERM, sentence=b"x"),)}, "sentence: no text, got b'x'"),  # type: ignore[arg-type]
+    "parameters in a list": ({"terms": (replace(TERM, parameters=[GOOD]),)}, "got list; a mapping is needed"),  # type: ignore[arg-type]
+    "a rival without a sentence": ({"terms": (replace(TERM, rivals={"x": None}),)}, "rivals.x: no text"),  # type: ignore[dict-item]
+    "conditions in a list": ({"conditions": ["x"]}, "conditions: not of the right type, got list"),
+    "a sensor that is none": ({"sensors": ([],)}, "sensors: no list of texts"),
     "a name that is taken": ({"parameters": {"kind": GOOD}}, "not to be used as a name, got 'kind'"),
     "a bare number": ({"parameters": {"slope": 1.0}}, "not a parameter, got float"),
     "a unit that is none of SI": ({"outputs": {OUT: Quantity("mm", "")}}, "not an SI unit, got 'mm'; 'm' is needed"),

@@ -62,6 +62,7 @@ def test_what_lies_outside_its_field_is_said(tmp_path: Path) -> None:
         (["vineyard_tractor", "--input", "h6=2"], "--input: h6: not an input, got 'h6'; did you mean 'H6'?"),
         (["vineyard_tractor", "--input", "B6=3"], "--input: B6: wider than the rear tyres, got 3 m; at most"),
         (["vineyard_tractor", "--input", "B6=wide"], "--input: B6: not a number, got 'wide'; a number in m"),
+        (["vineyard_tractor", "--input", "H6=null"], "--input: H6: not a number, got None; a number in m"),
         (["vineyard_tractor", "--input", f"H6={'9' * 400}"], "--input: H6: out of bounds, got 999"),
         (["vineyard_tractor", "--input", f"L6=-{'9' * 309}"], "--input: L6: out of bounds, got -999"),
         (["vineyard_tractor", "--input", f"Mc=0x{'f' * 5000}"], "--input: Mc: not a number, got '0xfff"),

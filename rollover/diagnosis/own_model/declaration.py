@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import inspect
-import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from string import Formatter
 from typing import Any, Literal, Protocol, runtime_checkable
@@ -17,6 +16,7 @@ from ground.quantity import Quantity
 from rollover.effects import Effect
 from rollover.effects.sensor import ORDER as SENSORS
 from rollover.spec.channels import UNITS, describe, is_known
+from rollover.system.arguments import is_finite_number
 from rollover.system.errors import Fault, InputError, hint
 
 Array = NDArray[np.float64]
@@ -136,6 +136,9 @@ def _wrong(model: Any) -> Iterator[tuple[str, str]]:
         yield name, f"not of the right type, got {got}; a {kinds[name].__name__.lower()} is needed"
     if wrong:
         return
+    if wrong_types := list(_wrong_types(model)):
+        yield from wrong_types  # what else is asked of them has no meaning
+        return
     yield from _wrong_channels(model)
     if not callable(model.simulate):
         yield "simulate", f"not a method, got {model.simulate!r}; simulate(time, inputs, values) is needed"
@@ -147,6 +150,43 @@ def _wrong(model: Any) -> Iterator[tuple[str, str]]:
     for sensor in sensors_of(model):
         if sensor not in SENSORS:
             yield "sensors", f"unknown sensor effect, got {sensor!r}; {hint(sensor, SENSORS)}"
+
+
+TEXTS: Mapping[type, tuple[str, ...]] = {
+    Term: ("id", "family", "equation", "sentence", "kind"),
+    Parameter: ("unit", "meaning", "scale"),
+    Quantity: ("unit", "meaning"),
+}
+
+
+def _wrong_types(model: Any) -> Iterator[tuple[str, str]]:
+    """What is no text, no mapping or no list of texts where one is declared."""
+    declared: list[tuple[str, Any]] = []
+    parts: list[tuple[str, Any]] = [(n, getattr(model, n)) for n in ("inputs", "outputs", "parameters")]
+    for k, term in enumerate(model.terms):
+        declared.append((f"terms[{k}]", term))
+        parts += [(f"terms[{k}].{n}", getattr(term, n)) for n in ("parameters", "rivals") if isinstance(term, Term)]
+    parts.append(("conditions", conditions_of(model)))
+    for path, part in parts:
+        if not isinstance(part, Mapping):
+            yield path, f"not of the right type, got {type(part).__name__}; a mapping is needed"
+            continue
+        for name, value in part.items():
+            declared.append((f"{path}.{name}", value))
+            if not isinstance(name, str):
+                yield path, f"a name that is no text, got {name!r}; a text is needed"
+            if path.endswith(".rivals") and not isinstance(value, str):
+                yield (
+                    f"{path}.{name}",
+                    f"no text, got {value!r}; a sentence on what tells them apart is needed",
+                )
+    for path, value in declared:
+        for name in TEXTS.get(type(value), ()):
+            if not isinstance(text := getattr(value, name), str):
+                yield f"{path}.{name}", f"no text, got {text!r}; a text is needed"
+    sensors = getattr(model, "sensors", ())
+    if isinstance(sensors, str) or not isinstance(sensors, Collection) or not all(isinstance(s, str) for s in sensors):
+        yield "sensors", f"no list of texts, got {sensors!r}; ids of sensor effects, or () for none, are needed"
 
 
 def _wrong_terms(model: Any) -> Iterator[tuple[str, str]]:
@@ -215,11 +255,7 @@ def _wrong_parameter(path: str, name: object, p: object, *, is_always: bool) -> 
     numbers = {
         n: v for n, v in (("low", p.low), ("high", p.high), ("start", p.start), ("null", p.null)) if v is not None
     }
-    bad = {
-        n: v
-        for n, v in numbers.items()
-        if isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v)
-    }
+    bad = {n: v for n, v in numbers.items() if not is_finite_number(v)}
     for n, v in bad.items():
         yield f"{path}.{n}", f"not a finite number, got {v!r}; a number in {p.unit} is needed"
     if bad:
