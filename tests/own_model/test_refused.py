@@ -120,7 +120,7 @@ DECLARED: dict[str, tuple[dict[str, Any], str]] = {
     "a number beyond all": ({"parameters": {"slope": replace(GOOD, high=10**400)}}, "not a finite number, got 1000"),
     "a channel without a name": ({"inputs": {None: Line.inputs[IN]}}, "a name that is no text, got None"),
     "a unit that is none": ({"outputs": {OUT: Quantity(3.0)}}, f"{OUT}.unit: no text, got 3.0"),  # type: ignore[arg-type]
-    "a term without an id": ({"terms": (replace(TERM, id=None),)}, "terms.0..id: no text, got None"),  # type: ignore[arg-type]
+    "a term without an id": ({"terms": (replace(TERM, id=None),)}, "terms[0].id: no text, got None"),  # type: ignore[arg-type]
     "a sentence of bytes": ({"terms": (replace(TERM, sentence=b"x"),)}, "sentence: no text, got b'x'"),  # type: ignore[arg-type]
     "parameters in a list": ({"terms": (replace(TERM, parameters=[GOOD]),)}, "got list; a mapping is needed"),  # type: ignore[arg-type]
     "a rival without a sentence": ({"terms": (replace(TERM, rivals={"x": None}),)}, "rivals.x: no text"),  # type: ignore[dict-item]
