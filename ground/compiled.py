@@ -1,15 +1,14 @@
 """The only home of the compiler: cached kernels, and laws called by address from inside them.
 
 Compiling costs some seconds once for each installation; the result is kept beside the environment
-(or in the user's cache folder where that is read-only) under a hash of the kernels' sources, so that
-an upgrade never runs a stale kernel.
+(or in the user's cache folder where that is read-only), that of each file under a hash of all that it
+may hold (`ground.sources`), so that a stale kernel never runs and an edit elsewhere compiles nothing anew.
 """
 
 from __future__ import annotations
 
 import atexit
 import errno
-import hashlib
 import os
 import shutil
 import sys
@@ -29,6 +28,8 @@ from numba.experimental import structref
 from numba.experimental.structref import StructRefProxy, define_proxy
 from numba.extending import intrinsic, lower_getattr_generic
 
+from ground.sources import ROOT, hash_of
+
 __all__ = [
     "ADVANCE",
     "BEGIN",
@@ -46,6 +47,7 @@ __all__ = [
     "force_law",
     "inlined",
     "is_warm",
+    "kept_under",
     "leaf",
     "mark_warm",
     "register",
@@ -94,27 +96,26 @@ def register(kind: Any) -> Any:
     return kind
 
 
-def _sources_hash() -> str:
-    root = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
-    for folder in ("ground", "rollover"):
-        for path in sorted((root / folder).rglob("*.py")):
-            text = path.read_bytes()
-            # all of ground/: its constants are frozen into the laws' kernels, also those of files that compile nothing
-            if folder == "ground" or b"ground.compiled" in text:
-                digest.update(path.name.encode() + text)
-    return digest.hexdigest()[:16]
-
-
 def cache_folder() -> Path:
-    """Folder of the compiled kernels of these very sources."""
+    """Folder of the compiled kernels of this installation, where nothing else is asked for."""
     local = Path(sys.prefix) / "var" / "rollover-kernels"
     if not os.access(sys.prefix, os.W_OK):
         local = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "rollover-kernels"
-    return local / _SOURCES
+    return local
 
 
-_SOURCES = _sources_hash()
+def kept_under(file: Path) -> str:
+    """Name of the folder of a file's machine code: another one for other sources, another compiler, another Python."""
+    return hash_of([file], _COMPILER)
+
+
+def _of_runs() -> str:
+    """The same over all that compiles for a run."""
+    folders = (ROOT / "ground", ROOT / "rollover" / "kernels")
+    return hash_of([file for folder in folders for file in sorted(folder.glob("*.py"))], _COMPILER)
+
+
+_COMPILER = f"{numba.__version__} {sys.version}"
 ROOM = 64 << 20  # bytes that the machine code of all kernels takes, and as much again
 
 
@@ -136,7 +137,7 @@ def _kept_at() -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
-        if not (folder / "warm").exists() and shutil.disk_usage(folder).free < ROOM:
+        if not any(folder.glob("warm*")) and shutil.disk_usage(folder).free < ROOM:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return folder
     except OSError as e:
@@ -161,14 +162,14 @@ def is_warm(integrator: str = "exudyn") -> bool:
 
 
 def _warm(integrator: str) -> str:
-    return "warm" if integrator == "exudyn" else f"warm-{integrator}"
+    return f"warm-{integrator}-{_of_runs()}"
 
 
 @contextmanager
 def _own_cache(function: Callable[..., Any]) -> Iterator[None]:
     """By module: machine code asks for the one it was made in, and a file of effects is loaded under another name."""
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(KEPT / function.__module__)
+    config.CACHE_DIR = str(KEPT / function.__module__ / kept_under(Path(function.__code__.co_filename)))
     try:
         yield
     finally:
