@@ -27,7 +27,7 @@ from rollover.studies.case_store import Row
 from rollover.studies.design import Points, points
 from rollover.studies.ensemble import neighbours, with_scatter
 from rollover.studies.plan import Random
-from rollover.studies.runner import START, Builder, Conducted, Way, conduct
+from rollover.studies.runner import START, Builder, Conducted, Way, conduct, evaluate
 from rollover.system.errors import InputError
 from tests.physics.test_integrators import STARTS, WITHIN
 from tests.rollover.studies import drops, made_up
@@ -272,6 +272,24 @@ def test_a_point_s_neighbouring_starts_are_cases_of_its_own_scenario(tmp_path: P
     keys = [builder.key({**at, START: float(k)}) for k in range(4)]
     assert keys[0] == builder.key(at)
     assert len(set(keys)) == 4
+
+
+def test_the_largest_difference_of_the_slope_study_is_its_energy_residual_and_within_scatter(tmp_path: Path) -> None:
+    """Point 130 of 256: two ten-thousandths of the energy by the one, three by the other; no load lies beyond."""
+    study = studies.load("slope_side_overturn")
+    every = points(study)
+    found = Points(columns={name: column[130:131] for name, column in every.columns.items()})
+    rows = evaluate(Builder(study), tmp_path, Way(workers=0), found)
+    done = Conducted(points=found, keys=[Builder(study).key(found.row(0))], rows=rows, ran=1)
+    check = reference.checked(study, tmp_path, Way(workers=0), done)
+    assert check is not None
+    by_name = {output["name"]: output["largest"] for output in check["outputs"]}
+    # a residual is what two sums of 1e4 J leave of each other: a tenth of it is nothing that a load would show
+    assert max(value for name, value in by_name.items() if name != "ledger/residual") < 0.1
+    beside = check["neighbours"]
+    assert {one["name"] for one in beside["responses"]} == {n for n, v in by_name.items() if v > reference.LARGE}
+    assert all(one["within"] for one in beside["responses"]), beside
+    assert len(case_store.on_shelf(tmp_path)) == 2 + 4  # the case, Exudyn's, and four neighbours
 
 
 def test_the_check_s_limit_is_student_s() -> None:
