@@ -60,7 +60,6 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _POINTER = types.CPointer(types.float64)
 _DATA = 3  # which member of what holds a bundle points to it
-_UNCOUNTED: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
 # force(p, s, z, v): parameters, memory, sinkage, sinkage rate -> force on the reference face
 FORCE = types.float64(_POINTER, _POINTER, types.float64, types.float64)
 # begin(p, s): at first touch, once s[SPEED] and s[MASS] are latched
@@ -176,16 +175,32 @@ def _own_cache(function: Callable[..., Any]) -> Iterator[None]:
         config.CACHE_DIR = before
 
 
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
+    """The compiler's, with one machine code for all values of a number.
+
+    It would make another for every constant that a caller hands on, also for the 0 at which a caller's sum begins.
+    """
+    with _own_cache(function):
+        made = numba.njit(error_model="numpy", cache=True, **options)(function)
+    template = made.get_call_template
+
+    def of_any_value(args: Any, named: Any) -> Any:
+        return template(
+            tuple(types.unliteral(kind) for kind in args), {name: types.unliteral(kind) for name, kind in named.items()}
+        )
+
+    made.get_call_template = of_any_value
+    return made
+
+
 def compiled(function: F) -> F:
     """Compile at the first call and keep the machine code on disk."""
-    with _own_cache(function):
-        return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+    return _compiled(function)  # type: ignore[no-any-return]
 
 
 def released(function: F) -> F:
     """The same as `compiled`, with Python's lock released while it runs: several may run at once, in threads."""
-    with _own_cache(function):
-        return numba.njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+    return _compiled(function, nogil=True)  # type: ignore[no-any-return]
 
 
 def leaf(function: F) -> F:
@@ -194,14 +209,12 @@ def leaf(function: F) -> F:
     It reads and writes arrays and bundles that it is handed, makes and returns none, and calls nothing that does. One
     array is copied into another number by number: as a slice it might be made anew on the way.
     """
-    with _own_cache(function):
-        return numba.njit(**_UNCOUNTED)(function)  # type: ignore[no-any-return]
+    return _compiled(function, _nrt=False)  # type: ignore[no-any-return]
 
 
 def inlined(function: F) -> F:
     """The same as `leaf`, laid out in each of its callers: for what is short, or asked again and again."""
-    with _own_cache(function):
-        return numba.njit(**_UNCOUNTED, forceinline=True)(function)  # type: ignore[no-any-return]
+    return _compiled(function, _nrt=False, forceinline=True)  # type: ignore[no-any-return]
 
 
 def force_law(function: Callable[..., float]) -> Any:
