@@ -228,6 +228,7 @@ def test_the_check_counts_what_ended_otherwise(tmp_path: Path, monkeypatch: pyte
         # t(0.9995, 4) sqrt(6/5) = 9.43 standard deviations of 0.0791 are 0.746
         (1.0 - 0.744, SPREAD, True, "scatters by 7.9 % between neighbouring starts"),
         (1.0 - 0.748, SPREAD, False, "neighbouring starts; beyond what these scatter by: ground/force_normal of point"),
+        (1.0 / 1.011, [1.0] * 5, False, "1.1 % at most; the largest, ground/force_normal of point"),  # from 1 % on
         (0.98, [1.0] * 5, False, "scatters by 0 % between neighbouring starts; beyond what these scatter by: ground/"),
         (0.98, [1.0, 1.0, 1.0, 1.0, float("nan")], None, "cannot be held against its neighbouring starts: 4 were done"),
         (0.98, [0.0] * 5, False, "is 0 in all neighbouring starts; beyond what these scatter by: ground/force_normal"),
