@@ -194,11 +194,14 @@ def _best(problem: Problem, r: int, made: Made, cost: Cost, shifts: Array) -> fl
     raw = made(0.0)
     if raw is None:
         return None
-    moved = np.empty((len(shifts), raw.size))
-    for time, (_, part) in zip(e.times, e.spans(), strict=True):
-        moved[:, part] = np.interp(time - shifts[:, None], time, raw[part])
-    rough = cost(moved, shifts)
-    near = shifts[int(np.argmin(rough))] + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
+    rough = []
+    for first in range(0, len(shifts), TUNING.search_at_once):
+        some = shifts[first : first + TUNING.search_at_once]
+        moved = np.empty((len(some), raw.size))
+        for time, (_, part) in zip(e.times, e.spans(), strict=True):
+            moved[:, part] = np.interp(time - some[:, None], time, raw[part])
+        rough.append(cost(moved, some))
+    near = shifts[int(np.argmin(np.concatenate(rough)))] + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
     there = [made(float(s)) for s in near]
     left = np.full(len(near), np.inf)
     known = [k for k, y in enumerate(there) if y is not None]
