@@ -96,7 +96,7 @@ def test_every_way_to_import_is_followed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("where", ["NUMBA_CACHE_DIR", ""])
-def test_a_number_that_another_file_gives_a_kernel_is_never_a_stale_one(tmp_path: Path, where: str) -> None:
+def test_a_number_from_another_file_is_never_stale(tmp_path: Path, where: str) -> None:
     """Also where a user says in which folder kernels are kept; the file of the kernel itself stays as it is."""
     (tmp_path / "numbers_of_mine.py").write_text("TWICE = 2.0\n")
     (tmp_path / "kernel_of_mine.py").write_text(

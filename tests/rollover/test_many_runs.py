@@ -234,7 +234,7 @@ def test_the_check_counts_what_ended_otherwise(tmp_path: Path, monkeypatch: pyte
         (0.98, [0.0] * 5, False, "is 0 in all neighbouring starts; beyond what these scatter by: ground/force_normal"),
     ],
 )
-def test_a_large_difference_stands_beside_the_scatter_of_neighbouring_starts(
+def test_a_large_difference_stands_beside_scatter_of_neighbours(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, factor: float, spread: list[float], within: bool | None, said: str
 ) -> None:
     check, _ = checked_with([{}, {FORCE: factor}, {}], [spread], tmp_path, monkeypatch)
@@ -253,15 +253,13 @@ def test_small_differences_ask_for_no_neighbours(tmp_path: Path, monkeypatch: py
     assert len(asked) == 1
 
 
-def test_a_response_that_exudyn_has_none_of_differs_by_all_of_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_response_that_is_0_by_exudyn_differs_by_all_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     check, _ = checked_with([{}, {}, {FORCE: 0.0}], [SPREAD], tmp_path, monkeypatch)
     assert (check["outputs"][0]["cases"], check["largest"]) == (3, 1.0)
     assert check["neighbours"]["responses"][0]["within"] is False
 
 
-def test_a_point_s_neighbouring_starts_are_cases_of_its_own_scenario(tmp_path: Path) -> None:
+def test_neighbouring_starts_of_a_point_are_cases_like_others(tmp_path: Path) -> None:
     """Kept like all others: the first is the case itself, the rest differ from it by gravity alone."""
     study = studies.load(drops(tmp_path, FULL, FEW))
     at = dict(points(study).row(2))
@@ -275,7 +273,7 @@ def test_a_point_s_neighbouring_starts_are_cases_of_its_own_scenario(tmp_path: P
     assert len(set(keys)) == 4
 
 
-def test_the_largest_difference_of_the_slope_study_is_its_energy_residual_and_within_scatter(tmp_path: Path) -> None:
+def test_the_slope_study_s_largest_difference_is_within_scatter(tmp_path: Path) -> None:
     """Point 130 of 256: two ten-thousandths of the energy by the one, three by the other; no load lies beyond."""
     study = studies.load("slope_side_overturn")
     every = points(study)
