@@ -1,15 +1,14 @@
 """The only home of the compiler: cached kernels, and laws called by address from inside them.
 
 Compiling costs some seconds once for each installation; the result is kept beside the environment
-(or in the user's cache folder where that is read-only) under a hash of the kernels' sources, so that
-an upgrade never runs a stale kernel.
+(or in the user's cache folder where that is read-only), that of each file under a hash of all that it
+may hold (`ground.sources`), so that a stale kernel never runs and an edit elsewhere compiles nothing anew.
 """
 
 from __future__ import annotations
 
 import atexit
 import errno
-import hashlib
 import os
 import shutil
 import sys
@@ -29,6 +28,8 @@ from numba.experimental import structref
 from numba.experimental.structref import StructRefProxy, define_proxy
 from numba.extending import intrinsic, lower_getattr_generic
 
+from ground.sources import ROOT, hash_of
+
 __all__ = [
     "ADVANCE",
     "BEGIN",
@@ -46,6 +47,7 @@ __all__ = [
     "force_law",
     "inlined",
     "is_warm",
+    "kept_under",
     "leaf",
     "mark_warm",
     "register",
@@ -58,7 +60,6 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _POINTER = types.CPointer(types.float64)
 _DATA = 3  # which member of what holds a bundle points to it
-_UNCOUNTED: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
 # force(p, s, z, v): parameters, memory, sinkage, sinkage rate -> force on the reference face
 FORCE = types.float64(_POINTER, _POINTER, types.float64, types.float64)
 # begin(p, s): at first touch, once s[SPEED] and s[MASS] are latched
@@ -94,27 +95,26 @@ def register(kind: Any) -> Any:
     return kind
 
 
-def _sources_hash() -> str:
-    root = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
-    for folder in ("ground", "rollover"):
-        for path in sorted((root / folder).rglob("*.py")):
-            text = path.read_bytes()
-            # all of ground/: its constants are frozen into the laws' kernels, also those of files that compile nothing
-            if folder == "ground" or b"ground.compiled" in text:
-                digest.update(path.name.encode() + text)
-    return digest.hexdigest()[:16]
-
-
 def cache_folder() -> Path:
-    """Folder of the compiled kernels of these very sources."""
+    """Folder of the compiled kernels of this installation, where nothing else is asked for."""
     local = Path(sys.prefix) / "var" / "rollover-kernels"
     if not os.access(sys.prefix, os.W_OK):
         local = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "rollover-kernels"
-    return local / _SOURCES
+    return local
 
 
-_SOURCES = _sources_hash()
+def kept_under(file: Path) -> str:
+    """Name of the folder of a file's machine code: another one for other sources, another compiler, another Python."""
+    return hash_of([file], _COMPILER)
+
+
+def _of_runs() -> str:
+    """The same over all that compiles for a run."""
+    folders = (ROOT / "ground", ROOT / "rollover" / "kernels")
+    return hash_of([file for folder in folders for file in sorted(folder.glob("*.py"))], _COMPILER)
+
+
+_COMPILER = f"{numba.__version__} {sys.version}"
 ROOM = 64 << 20  # bytes that the machine code of all kernels takes, and as much again
 
 
@@ -136,7 +136,7 @@ def _kept_at() -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
-        if not (folder / "warm").exists() and shutil.disk_usage(folder).free < ROOM:
+        if not any(folder.glob("warm*")) and shutil.disk_usage(folder).free < ROOM:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return folder
     except OSError as e:
@@ -161,30 +161,46 @@ def is_warm(integrator: str = "exudyn") -> bool:
 
 
 def _warm(integrator: str) -> str:
-    return "warm" if integrator == "exudyn" else f"warm-{integrator}"
+    return f"warm-{integrator}-{_of_runs()}"
 
 
 @contextmanager
 def _own_cache(function: Callable[..., Any]) -> Iterator[None]:
     """By module: machine code asks for the one it was made in, and a file of effects is loaded under another name."""
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(KEPT / function.__module__)
+    config.CACHE_DIR = str(KEPT / function.__module__ / kept_under(Path(function.__code__.co_filename)))
     try:
         yield
     finally:
         config.CACHE_DIR = before
 
 
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
+    """The compiler's, with one machine code for all values of a number.
+
+    It would make another for every constant that a caller hands on, also for the 0 at which a caller's sum begins.
+    """
+    with _own_cache(function):
+        made = numba.njit(error_model="numpy", cache=True, **options)(function)
+    template = made.get_call_template
+
+    def of_any_value(args: Any, named: Any) -> Any:
+        return template(
+            tuple(types.unliteral(kind) for kind in args), {name: types.unliteral(kind) for name, kind in named.items()}
+        )
+
+    made.get_call_template = of_any_value
+    return made
+
+
 def compiled(function: F) -> F:
     """Compile at the first call and keep the machine code on disk."""
-    with _own_cache(function):
-        return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+    return _compiled(function)  # type: ignore[no-any-return]
 
 
 def released(function: F) -> F:
     """The same as `compiled`, with Python's lock released while it runs: several may run at once, in threads."""
-    with _own_cache(function):
-        return numba.njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+    return _compiled(function, nogil=True)  # type: ignore[no-any-return]
 
 
 def leaf(function: F) -> F:
@@ -193,14 +209,12 @@ def leaf(function: F) -> F:
     It reads and writes arrays and bundles that it is handed, makes and returns none, and calls nothing that does. One
     array is copied into another number by number: as a slice it might be made anew on the way.
     """
-    with _own_cache(function):
-        return numba.njit(**_UNCOUNTED)(function)  # type: ignore[no-any-return]
+    return _compiled(function, _nrt=False)  # type: ignore[no-any-return]
 
 
 def inlined(function: F) -> F:
     """The same as `leaf`, laid out in each of its callers: for what is short, or asked again and again."""
-    with _own_cache(function):
-        return numba.njit(**_UNCOUNTED, forceinline=True)(function)  # type: ignore[no-any-return]
+    return _compiled(function, _nrt=False, forceinline=True)  # type: ignore[no-any-return]
 
 
 def force_law(function: Callable[..., float]) -> Any:

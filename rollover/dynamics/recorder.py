@@ -89,7 +89,7 @@ class Recorder:
         dt = time - self.last  # the solver halves a step that does not converge
         self.last = time
         live.tables.clock[1] = now
-        end_of_step(live.handle, q, qd, qdd, dt, self.force)
+        end_of_step(live.handle, q, qd, qdd, dt, self.force, False)
         throttle(live.handle, watch.drive, now)
         self.see_to(loop.check(live.handle, watch, qd, self.force), time, qd)
         goes_on = self.control is None or self.control.after(now, dt, q, qd, live.tables)

@@ -221,8 +221,8 @@ def new_matrix(t: Any, s: Any, w: Any, h: float) -> bool:
 
 
 @compiled
-def improve(t: Any, s: Any, w: Any, h: float) -> float:
-    """One iteration of Newton's; returns the norm of the residual that is left."""
+def improve(t: Any, s: Any, w: Any, h: float) -> None:
+    """Where one iteration of Newton's leads: the state of `s`."""
     n, scale = s.q.size, s.scheme[BETA] * h * h
     for k in range(n):
         w.change[k] = scale * w.residual[k]
@@ -238,7 +238,6 @@ def improve(t: Any, s: Any, w: Any, h: float) -> float:
     for k in range(w.joint.size):
         w.joint[k] -= w.change[n + k] / scale
     place_bodies(s, w, t.pose.shape[0])
-    return residual_of(t, s, w)
 
 
 @leaf
@@ -268,7 +267,8 @@ def solve_step(t: Any, s: Any, w: Any, h: float) -> int:
             if not new_matrix(t, s, w, h):
                 return 0
             renew = False
-        left = improve(t, s, w, h)
+        improve(t, s, w, h)
+        left = residual_of(t, s, w)
         if left > first and count == 1:
             first = last = left
         if left <= TOLERANCE * first or left <= TOLERANCE:
@@ -304,15 +304,22 @@ def accept(s: Any) -> None:
         s.filtered[k] += factor * s.qdd[k]
 
 
-@compiled
-def first_accelerations(t: Any, s: Any, w: Any) -> None:
-    """Accelerations of the start, where the joints' rows do not change: M a + G' l = Q, G a = 0."""
-    n, c = s.q.size, w.joint.size
-    for k in range(n):
+@leaf
+def stand_still(s: Any, w: Any) -> None:
+    """Nothing accelerates yet, and no joint is under load."""
+    for k in range(s.q.size):
         s.qdd[k] = 0.0
-    for k in range(c):
+    for k in range(w.joint.size):
         w.joint[k] = 0.0
-    residual_of(t, s, w)
+
+
+@compiled
+def first_accelerations(s: Any, w: Any) -> None:
+    """Accelerations of the start by the residuals of what stands still; the joints' rows do not change.
+
+    M a + G' l = Q, G a = 0.
+    """
+    n, c = s.q.size, w.joint.size
     for i in range(n + c):
         w.change[i] = -w.residual[i] if i < n else 0.0
         for k in range(n + c):

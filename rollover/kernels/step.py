@@ -80,16 +80,14 @@ from rollover.kernels.wheel_spin import finish_spins, keep_spins, tread_motion, 
 
 
 @compiled
-def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
-    """Book, commit, renew the contacts, exchange momentum with what was newly hit (writes qd)."""
-    t.clock[0] = h
-    generalised_forces(t, q, qd, Q)
-    finish_step(t, q, qd, qdd, h)
+def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any, is_tried: bool) -> None:
+    """Book, commit, renew the contacts, exchange momentum with what was newly hit (writes qd).
 
-
-@compiled
-def finish_step(t: Any, q: Any, qd: Any, qdd: Any, h: float) -> None:
-    """The same, where the forces of (q, qd) are those that were tried last."""
+    `is_tried` says that the forces of (q, qd) are those that were tried last.
+    """
+    if not is_tried:
+        t.clock[0] = h
+        generalised_forces(t, q, qd, Q)
     for b in range(t.pose.shape[0]):
         for k in range(3):
             t.pose[b, ACC + k] = qdd[6 * b + k]

@@ -36,6 +36,7 @@ from rollover.system.processes import Failure, Outcome, map_cases
 TIME_LIMIT = 600.0  # s of wall time, for one case
 MEMORY_LIMIT = 4e9  # bytes that one case may take
 INTEGRATOR = "simulation.integrator"
+START = "neighbouring start"  # column of points that says which one is meant; no axis has a name of two words
 Show = Callable[["Progress"], None]
 
 
@@ -79,6 +80,10 @@ class Builder:
     def scenario(self, values: Mapping[str, Any]) -> Scenario:
         """The scenario of one point, its integrator chosen. Raises ``ValueError`` for values that it does not allow."""
         found = self._changed(values)
+        if start := int(values.get(START, 0)):
+            from rollover.studies.ensemble import neighbours  # brings the simulation with it
+
+            found = neighbours(found, start + 1)[start]
         if self.study.simulator == "drop":
             return found
         return found.replaced({INTEGRATOR: self.integrator}) if self.integrator else found.of_many()

@@ -165,7 +165,7 @@ def advance(t: Any, q: Any, qd: Any, a: Any, h: float, gravity: float, first: in
         accelerations(t, q, v, Q, gravity, room, a)
         for k in range(n):
             qd[k] += 0.5 * h * a[k]
-        end_of_step(t, q, qd, a, h, Q)
+        end_of_step(t, q, qd, a, h, Q, False)
         t.counts[EVENTS] = 0
         accelerations(t, q, qd, Q, gravity, room, a)
     return last

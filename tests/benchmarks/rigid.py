@@ -1,4 +1,6 @@
-"""MuJoCo's yardstick: the same tractor as a rigid set of geoms that falls on a height field with as many cells.
+"""MuJoCo's yardstick: the same tractor as a rigid set of geoms that falls on a plane, or on a field of as many cells.
+
+Two forms of it: its own boxes and cylinders, or 200 spheres on its outline, which are quicker to find contacts of.
 
 What is the same: masses, inertias, start pose and velocity, outline, ROPS members, tyre treads, gravity, step, the
 rectangle and its number of cells, friction coefficients. What differs: the ground is rigid and flat (MuJoCo's soft
@@ -11,7 +13,7 @@ from __future__ import annotations
 import math
 import time as clock
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
@@ -26,6 +28,9 @@ from rollover.spec.vehicle import Striker
 from tests.benchmarks.limit import caught
 
 Array = NDArray[np.float64]
+Form = Literal["shapes", "spheres"]
+Ground = Literal["field", "plane"]
+SPHERES, AROUND, SMALL = 200, 24, 0.03  # in all, of them around each tyre; radius, m
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +41,7 @@ class Fall:
     reached: float
     whole: bool
     roll: float
+    place: tuple[float, float, float]  # of the chassis' centre of mass at the end, m
 
 
 def text(values: Any) -> str:
@@ -55,7 +61,15 @@ def geom(shape: Box | Tube | Disc, centre: Array, friction: float) -> str:
     return f'<geom {kind} friction="{friction:.6g}"/>'
 
 
-def model_text(scenario: Scenario, bodies: tuple[Body, ...], start: Start) -> str:
+def spheres(count: int, points: Array, friction: float) -> list[str]:
+    """So many of the contact points of a body (n, 3), about its centre of mass, as small spheres."""
+    chosen = points[np.unique(np.linspace(0, len(points) - 1, min(count, len(points))).astype(int))]
+    return [f'<geom type="sphere" pos="{text(p)}" size="{SMALL}" friction="{friction:.6g}"/>' for p in chosen]
+
+
+def model_text(
+    scenario: Scenario, bodies: tuple[Body, ...], start: Start, form: Form = "shapes", ground: Ground = "field"
+) -> str:
     """MJCF of the scenario's vehicle at its start and of its ground."""
     vehicle = scenario.vehicle
     assert not isinstance(vehicle, Striker)
@@ -65,9 +79,17 @@ def model_text(scenario: Scenario, bodies: tuple[Body, ...], start: Start) -> st
     mu = scenario.ground.friction.coefficient
     row = {body.name: b for b, body in enumerate(bodies)}
     lift = -math.inf
-    for shape in vehicle.outline:
+    if form == "spheres":
+        # points of an outline are those of the product, which has some hundred times as many of them
+        points = [
+            np.concatenate([p.position for _, p in b.surfaces]) if b.surfaces else np.zeros((0, 3)) for b in bodies
+        ]
+        share = (SPHERES - AROUND * len(vehicle.wheels)) / sum(len(p) for p in points)
+        for body, own in zip(bodies, points, strict=True):
+            geoms[body.name] += spheres(round(share * len(own)), own - body.centre, mu)
+    for shape in vehicle.outline if form == "shapes" else ():
         geoms["chassis"].append(geom(shape, bodies[0].centre, mu))
-    if vehicle.rops is not None:
+    if vehicle.rops is not None and form == "shapes":
         for shape in vehicle.rops.members:
             geoms["rops"].append(geom(shape, bodies[row["rops"]].centre, mu))
     for wheel in vehicle.wheels:
@@ -75,7 +97,13 @@ def model_text(scenario: Scenario, bodies: tuple[Body, ...], start: Start) -> st
         x, half, radius = np.array(wheel.centre), 0.5 * wheel.tyre.width, wheel.tyre.radius - wheel.tyre.crown
         y = np.array([0.0, half, 0.0])
         tread = Tube(name=wheel.name, start=tuple(x - y), end=tuple(x + y), diameter=2.0 * radius)
-        geoms[wheel.carrier].append(geom(tread, bodies[b].centre, wheel.tyre.friction))
+        if form == "shapes":
+            geoms[wheel.carrier].append(geom(tread, bodies[b].centre, wheel.tyre.friction))
+        else:
+            turn = np.linspace(0.0, 2.0 * math.pi, AROUND, endpoint=False)
+            side = half * np.where(np.arange(AROUND) % 2, 1.0, -1.0)  # left and right shoulder in turn
+            ring = np.stack([(radius - SMALL) * np.cos(turn), side, (radius - SMALL) * np.sin(turn)], axis=1)
+            geoms[wheel.carrier] += spheres(AROUND, x - bodies[b].centre + ring, wheel.tyre.friction)
         centre, lean = q[b, :3] + R[b] @ (x - bodies[b].centre), abs(R[b][2, 1])
         lift = max(lift, radius * math.sqrt(1.0 - lean * lean) + half * lean - centre[2])
 
@@ -93,13 +121,15 @@ def model_text(scenario: Scenario, bodies: tuple[Body, ...], start: Start) -> st
     elements = scenario.ground.elements
     size = text([0.5 * nx * elements.spacing[0], 0.5 * ny * elements.spacing[1], 1.0, 0.1])
     at = text([*elements.centre, 0.0])
+    field = f'<geom type="hfield" hfield="ground" pos="{at}" friction="{mu:.6g}"/>'
+    flat = f'<geom type="plane" size="0 0 1" friction="{mu:.6g}"/>'
     nested = "".join(opened(b, body, "") + "</body>" for b, body in enumerate(bodies) if b > 0)
     return f"""<mujoco>
   <option timestep="{scenario.simulation.step:.12g}" gravity="0 0 {-scenario.gravity:.12g}"/>
   <size memory="256M"/>
   <asset><hfield name="ground" nrow="{max(ny, 2)}" ncol="{max(nx, 2)}" size="{size}"/></asset>
   <worldbody>
-    <geom type="hfield" hfield="ground" pos="{at}" friction="{mu:.6g}"/>
+    {field if ground == "field" else flat}
     {opened(0, bodies[0], "<freejoint/>")}{nested}</body>
   </worldbody>
 </mujoco>"""
@@ -112,10 +142,10 @@ def rotation_wxyz(R: Array) -> Array:
     return quaternion
 
 
-def fall(scenario: Scenario, budget: float = 20.0) -> Fall:
+def fall(scenario: Scenario, budget: float = 20.0, form: Form = "shapes", ground: Ground = "field") -> Fall:
     """Let MuJoCo simulate the scenario's duration, or as much of it as fits the budget of CPU seconds."""
     given = caught(scenario)
-    model = mujoco.MjModel.from_xml_string(model_text(scenario, given["bodies"], given["start"]))
+    model = mujoco.MjModel.from_xml_string(model_text(scenario, given["bodies"], given["start"], form, ground))
     data = mujoco.MjData(model)
     data.qvel[:6] = given["start"].qd[:6]  # world velocity, angular velocity in body axes, as ours
     steps = round(scenario.simulation.duration / scenario.simulation.step)
@@ -128,4 +158,4 @@ def fall(scenario: Scenario, budget: float = 20.0) -> Fall:
     w, x, y, z = data.qpos[3:7]
     roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     reached = done * scenario.simulation.step
-    return Fall(cost=taken / reached, reached=reached, whole=done == steps, roll=roll)
+    return Fall(cost=taken / reached, reached=reached, whole=done == steps, roll=roll, place=tuple(data.xipos[1]))

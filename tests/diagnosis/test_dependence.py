@@ -27,7 +27,8 @@ from rollover.diagnosis.inference.drop_dependence import (
     loading_paths,
 )
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
-from rollover.diagnosis.inference.residual_force import channels_of, newmark_response
+from rollover.diagnosis.inference.newmark import newmark_response
+from rollover.diagnosis.inference.residual_force import channels_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.spectral_lines import lines, without
 from rollover.diagnosis.selection.flexibility import is_flexible_soil, is_over_flexible

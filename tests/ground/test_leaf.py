@@ -86,3 +86,26 @@ def test_what_does_not_count_gives_the_same_bits() -> None:
             assert normal_force(law, p, s, row, y[0], y[1]) == force(law, p, s, row, y[0], y[1])
     pose = draw.normal(size=24)
     assert to_world(pose, 0.1, 0.2, 0.3) == counted(to_world)(pose, 0.1, 0.2, 0.3)
+
+
+@compiled
+def power(x: float, n: int) -> float:
+    found = 1.0
+    for _ in range(n):
+        found *= x
+    return found
+
+
+def sum_of_powers(x: float, counted: Any) -> float:
+    n = 0
+    for one in counted:
+        if one > 0.0:
+            n += 1
+    return power(x, 2) + power(x, 3) + power(x, n)
+
+
+def test_constants_of_callers_make_no_further_machine_code() -> None:
+    """Else each 2, each 3 and each sum that begins at 0 is compiled by itself, with all that is called below."""
+    caller = numba.njit(sum_of_powers)  # one that is kept on disk would not ask for what it calls
+    assert caller(2.0, np.array([1.0, -1.0, 1.0, 1.0])) == 4.0 + 8.0 + 8.0
+    assert len(power.signatures) == 1  # type: ignore[attr-defined]

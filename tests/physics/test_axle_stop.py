@@ -65,7 +65,7 @@ def struck(scenario: Scenario, chassis_rate: float, axle_rate: float) -> tuple[T
         before = qd.copy()
         generalised_forces(kernels, q, qd, Q)
         start_step(kernels)
-        end_of_step(kernels, q, qd, np.zeros(12), 1e-3, Q)
+        end_of_step(kernels, q, qd, np.zeros(12), 1e-3, Q, False)
     return t, before, qd
 
 

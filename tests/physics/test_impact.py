@@ -39,7 +39,7 @@ def hit(scenario: Scenario, R: Array, v: Array, omega: Array, depth: float = 1e-
     kernels = handle(t)
     generalised_forces(kernels, q, qd, Q)
     start_step(kernels)
-    end_of_step(kernels, q, qd, np.zeros_like(qd), 1e-4, Q)
+    end_of_step(kernels, q, qd, np.zeros_like(qd), 1e-4, Q, False)
     return t, before, qd
 
 

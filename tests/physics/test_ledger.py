@@ -226,9 +226,9 @@ def test_a_step_that_the_solver_halves_is_booked_as_it_was_taken(monkeypatch: py
     )
     shortest: list[float] = []
 
-    def watched(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
+    def watched(t: Any, q: Any, qd: Any, qdd: Any, h: float, *rest: Any) -> None:
         shortest.append(h)
-        end_of_step(t, q, qd, qdd, h, Q)
+        end_of_step(t, q, qd, qdd, h, *rest)
 
     monkeypatch.setattr(recorder, "end_of_step", watched)
     assert closure(run(scenario)).largest < 0.2 * LIMIT

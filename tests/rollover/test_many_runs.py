@@ -14,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rollover import studies
+from rollover.assessment.results import plain
 from rollover.cli.main import app
 from rollover.dynamics import simulate
 from rollover.recording import read_table
@@ -22,9 +23,11 @@ from rollover.spec.document import content_hash, shipped_folder
 from rollover.studies import case_store, reference
 from rollover.studies.carry_out import prepared
 from rollover.studies.case import _simulated
+from rollover.studies.case_store import Row
+from rollover.studies.design import Points, points
 from rollover.studies.ensemble import neighbours, with_scatter
 from rollover.studies.plan import Random
-from rollover.studies.runner import Builder, Conducted, Way, conduct
+from rollover.studies.runner import START, Builder, Conducted, Way, conduct, evaluate
 from rollover.system.errors import InputError
 from tests.physics.test_integrators import STARTS, WITHIN
 from tests.rollover.studies import drops, made_up
@@ -157,26 +160,140 @@ def test_the_study_s_seed_chooses_a_hundredth(tmp_path: Path) -> None:
     assert reference.chosen(study, alike) == [0]
 
 
-def test_the_check_counts_what_ended_otherwise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def checked_with(
+    again: list[dict[str, float] | None], beside: list[list[float]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> tuple[dict[str, Any], list[Any]]:
+    """The check of three cases of which Exudyn has measures, or none, relative to the loop's; and what was asked for.
+
+    `beside` is what the force of neighbouring starts is, relative to that of the case, for each case looked at.
+    """
     study, made = made_up(tmp_path, 300)
     done = by_loop(made)
     at = reference.chosen(study, done)
     rows = [done.rows[k] for k in at]
     assert all(row.status == "done" for row in rows)
-    higher = {**rows[0].measures, "ground/force_normal": rows[0].measures["ground/force_normal"] / 1.25}
-    none = replace(rows[1], status="failed", measures={})
-    monkeypatch.setattr(reference, "evaluate", lambda *_: [replace(rows[0], measures=higher), none, rows[2]])
+    asked: list[Any] = []
+
+    def evaluated(builder: Builder, folder: Path, way: Way, found: Points, show: Any = None) -> list[Row]:
+        asked.append((builder.integrator, found))
+        if len(asked) == 1:
+            return [
+                replace(row, status="failed", measures={})
+                if factors is None
+                else replace(row, measures={n: factors.get(n, 1.0) * v for n, v in row.measures.items()})
+                for row, factors in zip(rows, again, strict=True)
+            ]
+        of = [row for row, factors in zip(rows, again, strict=True) if factors]
+        return [
+            replace(row, measures={n: factor * v for n, v in row.measures.items()})
+            for row, factors in zip(of, beside, strict=True)
+            for factor in factors
+        ]
+
+    monkeypatch.setattr(reference, "evaluate", evaluated)
     check = reference.checked(study, tmp_path, Way(), done, at)
     assert check is not None
+    assert check["points"] == at
+    return check, asked
+
+
+FORCE = "ground/force_normal"
+SPREAD = [1.0, 0.9, 1.1, 0.95, 1.05]  # mean 1, standard deviation 0.0791: within is 0.745 of the mean
+
+
+def test_the_check_counts_what_ended_otherwise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    check, asked = checked_with([{FORCE: 0.8}, None, {}], [SPREAD], tmp_path, monkeypatch)
     assert (check["cases"], check["ended_otherwise"]) == (3, 1)
     force, sinkage = check["outputs"]
-    assert (force["cases"], force["at_point"], sinkage["largest"]) == (2, at[0], 0.0)
+    assert (force["cases"], force["at_point"], sinkage["largest"]) == (2, check["points"][0], 0.0)
     assert force["largest"] == check["largest"] == pytest.approx(0.25)
     assert force["median"] == pytest.approx(0.125)
+    where = f"ground/force_normal of point {check['points'][0]}"
     assert reference.sentence(check) == (
         "3 cases run again by Exudyn: responses differ by 0 % (median), 25 % at most; "
+        f"the largest, {where}, scatters by 7.9 % between neighbouring starts; "
         "1 of them ended otherwise, done by the one and failed by the other"
     )
+    # the loop's own starts, of the one case that is far off
+    (_, first), (who, beside) = asked
+    assert (first.count, who, beside.count) == (3, "", 5)
+    assert beside.columns[START].tolist() == [0, 1, 2, 3, 4]
+    assert set(beside.columns["speed"]) == {first.columns["speed"][0]}
+
+
+@pytest.mark.parametrize(
+    ("factor", "spread", "within", "said"),
+    [
+        (1.0 / (1.0 + 0.7), SPREAD, True, "scatters by 7.9 % between neighbouring starts"),
+        # t(0.9995, 4) sqrt(6/5) = 9.43 standard deviations of 0.0791 are 0.746
+        (1.0 - 0.744, SPREAD, True, "scatters by 7.9 % between neighbouring starts"),
+        (1.0 - 0.748, SPREAD, False, "neighbouring starts; beyond what these scatter by: ground/force_normal of point"),
+        (1.0 / 1.011, [1.0] * 5, False, "1.1 % at most; the largest, ground/force_normal of point"),  # from 1 % on
+        (0.98, [1.0] * 5, False, "scatters by 0 % between neighbouring starts; beyond what these scatter by: ground/"),
+        (0.98, [1.0, 1.0, 1.0, 1.0, float("nan")], None, "cannot be held against its neighbouring starts: 4 were done"),
+        (0.98, [0.0] * 5, False, "is 0 in all neighbouring starts; beyond what these scatter by: ground/force_normal"),
+    ],
+)
+def test_a_large_difference_stands_beside_scatter_of_neighbours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, factor: float, spread: list[float], within: bool | None, said: str
+) -> None:
+    check, _ = checked_with([{}, {FORCE: factor}, {}], [spread], tmp_path, monkeypatch)
+    beside = check["neighbours"]
+    assert (beside["starts"], beside["cases"]) == (5, 1)
+    (response,) = beside["responses"]
+    assert (response["name"], response["point"], response["within"]) == (FORCE, check["points"][1], within)
+    assert response["difference"] == check["largest"] == pytest.approx(abs(1.0 - factor) / factor)
+    assert said in reference.sentence(check)
+    json.dumps(plain(check), allow_nan=False)
+
+
+def test_small_differences_ask_for_no_neighbours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    check, asked = checked_with([{FORCE: 1.009}, {}, {}], [], tmp_path, monkeypatch)
+    assert check["neighbours"] is None
+    assert len(asked) == 1
+
+
+def test_a_response_that_is_0_by_exudyn_differs_by_all_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    check, _ = checked_with([{}, {}, {FORCE: 0.0}], [SPREAD], tmp_path, monkeypatch)
+    assert (check["outputs"][0]["cases"], check["largest"]) == (3, 1.0)
+    assert check["neighbours"]["responses"][0]["within"] is False
+
+
+def test_neighbouring_starts_of_a_point_are_cases_like_others(tmp_path: Path) -> None:
+    """Kept like all others: the first is the case itself, the rest differ from it by gravity alone."""
+    study = studies.load(drops(tmp_path, FULL, FEW))
+    at = dict(points(study).row(2))
+    builder = Builder(study)
+    own = builder.scenario(at)
+    starts = [builder.scenario({**at, START: float(k)}) for k in range(4)]
+    assert starts == neighbours(own, 4)
+    assert [round(1e6 * (s.gravity / own.gravity - 1.0), 3) for s in starts] == [0.0, 1.0, -1.0, 2.0]
+    keys = [builder.key({**at, START: float(k)}) for k in range(4)]
+    assert keys[0] == builder.key(at)
+    assert len(set(keys)) == 4
+
+
+def test_the_slope_study_s_largest_difference_is_within_scatter(tmp_path: Path) -> None:
+    """Point 130 of 256: two ten-thousandths of the energy by the one, three by the other; no load lies beyond."""
+    study = studies.load("slope_side_overturn")
+    every = points(study)
+    found = Points(columns={name: column[130:131] for name, column in every.columns.items()})
+    rows = evaluate(Builder(study), tmp_path, Way(workers=0), found)
+    done = Conducted(points=found, keys=[Builder(study).key(found.row(0))], rows=rows, ran=1)
+    check = reference.checked(study, tmp_path, Way(workers=0), done)
+    assert check is not None
+    by_name = {output["name"]: output["largest"] for output in check["outputs"]}
+    # a residual is what two sums of 1e4 J leave of each other: a tenth of it is nothing that a load would show
+    assert max(value for name, value in by_name.items() if name != "ledger/residual") < 0.1
+    beside = check["neighbours"]
+    assert {one["name"] for one in beside["responses"]} == {n for n, v in by_name.items() if v > reference.LARGE}
+    assert all(one["within"] for one in beside["responses"]), beside
+    assert len(case_store.on_shelf(tmp_path)) == 2 + 4  # the case, Exudyn's, and four neighbours
+
+
+def test_the_check_s_limit_is_student_s() -> None:
+    assert pytest.approx(WITHIN, rel=1e-6) == reference.WITHIN
+    assert reference.STARTS == STARTS
 
 
 def test_neighbours_of_a_run_are_many_and_the_run_is_not(monkeypatch: pytest.MonkeyPatch) -> None:

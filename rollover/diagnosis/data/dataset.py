@@ -257,6 +257,11 @@ class Dataset:
         return found
 
     @cached_property
+    def times(self) -> tuple[Array, ...]:
+        """Stamps (n,) of the samples of each signal, s."""
+        return tuple(self.recording.time[s.rows] for s in self.signals)
+
+    @cached_property
     def values(self) -> Array:
         """The measured samples, one signal after another, SI."""
         return np.concatenate([s.values for s in self.signals])

@@ -34,7 +34,7 @@ TUNING = SETTINGS.fit.time_shift
 UNKNOWN = 1e30  # power of what cannot be compared
 
 Made = Callable[[float], Array | None]
-Cost = Callable[[Array, float], float]
+Cost = Callable[[Array, Array], Array]  # of runs (m, n), each that many of the shifts (m,) late, s: what each leaves
 
 
 def align(problem: Problem) -> None:
@@ -125,7 +125,7 @@ def _distant_shift(problem: Problem, r: int, *, fitted: Fitted) -> float | None:
         problem,
         r,
         made,
-        partial(_left, e),
+        lambda raws, shifts: np.array([_left(e, raw, float(shift)) for raw, shift in zip(raws, shifts, strict=True)]),
         np.arange(-TUNING.largest_error, TUNING.largest_error, min(e.shift_prior, TUNING.no_physics)),
     )
     shown = [at for at in onset_delay(e) if abs(at) > TUNING.no_physics] if falls else []
@@ -161,17 +161,26 @@ def _left(e: Dataset, raw: Array, shift: float, *, whole: bool = False) -> float
 
     `whole` says that a run is known at all stamps, however late.
     """
-    signals, known = [], np.zeros(raw.size, dtype=bool)
-    for s, part in e.spans():
-        time = e.recording.time[s.rows]
-        known[part] = whole | ((time - shift >= time[0]) & (time - shift <= time[-1]))
-        signals.append(s if s.weight is None else replace(s, weight=np.interp(time - shift, time, s.weight)))
+    known = np.full(raw.size, whole)
+    for time, (_, part) in zip(e.times, e.spans(), strict=True):
+        if not whole:
+            at = time - shift
+            known[part] = (at >= time[0]) & (at <= time[-1])
     if known.mean() < TUNING.least_overlap or not np.all(np.isfinite(raw[known])):
         return UNKNOWN
-    moved = replace(e, signals=tuple(signals))
-    misfit = np.where(known, np.concatenate([s.values for s in signals]) - e.masked(raw, e.discontinuities(raw)), 0.0)
+    moved = _with_weights_moved(e, shift)
+    misfit = np.where(known, e.values - e.masked(raw, e.discontinuities(raw)), 0.0)
     left = moved.whitened(misfit)[known]
     return float(left @ left / np.sum(moved.due[known]))
+
+
+def _with_weights_moved(e: Dataset, shift: float) -> Dataset:
+    """A recording whose weights come `shift` (s) late; itself where there are none."""
+    if all(s.weight is None for s in e.signals):
+        return e
+    each = zip(e.times, e.signals, strict=True)
+    moved = [s if s.weight is None else replace(s, weight=np.interp(t - shift, t, s.weight)) for t, s in each]
+    return replace(e, signals=tuple(moved))
 
 
 def _places(e: Dataset) -> Array:
@@ -186,38 +195,47 @@ def _best(problem: Problem, r: int, made: Made, cost: Cost, shifts: Array) -> fl
     if raw is None:
         return None
     rough = []
-    for s in shifts:
-        moved = raw.copy()
-        for signal, part in e.spans():
-            time = e.recording.time[signal.rows]
-            moved[part] = np.interp(time - s, time, raw[part])
-        rough.append(cost(moved, float(s)))
-    near = shifts[int(np.argmin(rough))] + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
+    for first in range(0, len(shifts), TUNING.search_at_once):
+        some = shifts[first : first + TUNING.search_at_once]
+        moved = np.empty((len(some), raw.size))
+        for time, (_, part) in zip(e.times, e.spans(), strict=True):
+            moved[:, part] = np.interp(time - some[:, None], time, raw[part])
+        rough.append(cost(moved, some))
+    near = shifts[int(np.argmin(np.concatenate(rough)))] + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
     there = [made(float(s)) for s in near]
-    left = [np.inf if y is None else cost(y, float(s)) for s, y in zip(near, there, strict=True)]
+    left = np.full(len(near), np.inf)
+    known = [k for k, y in enumerate(there) if y is not None]
+    if known:
+        left[known] = cost(np.stack([y for y in there if y is not None]), near[known])
     return float(near[int(np.argmin(left))])
 
 
-def _whole(problem: Problem, r: int, raw: Array, shift: float) -> float:
+def _prior(e: Dataset, shifts: Array) -> Array:
+    """What shifts (m,), s, cost by themselves."""
+    return np.array([(float(shift) / e.shift_prior) ** 2 for shift in shifts])
+
+
+def _whole(problem: Problem, r: int, raws: Array, shifts: Array) -> Array:
     """What is left of recording r by all its samples."""
     e = problem.dataset[r]
-    return float(np.sum(e.marginalised(problem.measured[r] - e.whitened(raw)) ** 2)) + (shift / e.shift_prior) ** 2
+    left = [float(np.sum(e.marginalised(problem.measured[r] - e.whitened(raw)) ** 2)) for raw in raws]
+    return np.asarray(left) + _prior(e, shifts)
 
 
-def onset(problem: Problem, r: int, raw: Array, shift: float) -> float:
-    """-2 ln of the likelihood that recording r falls until its contact, `shift` (s) late, and is something else then.
+def onset(problem: Problem, r: int, raws: Array, shifts: Array) -> Array:
+    """-2 ln of the likelihood that recording r falls until its contact, `shifts` (s) late, and is something else then.
 
     Before, what it misses is noise; thereafter it may be as large as what is predicted, and larger at times: a Cauchy
     distribution of that width.
     """
     e = problem.dataset[r]
-    total = (shift / e.shift_prior) ** 2
-    for s, part in e.spans():
-        late = e.recording.time[s.rows] > e.simulator.contact + shift
-        z = (s.values - raw[part]) / s.sigma
-        wide = np.hypot(1.0, (raw[part] - raw[part][0]) / s.sigma)
+    total = _prior(e, shifts)
+    for time, (s, part) in zip(e.times, e.spans(), strict=True):
+        raw, late = raws[:, part], time > e.simulator.contact + shifts[:, None]
+        z = (s.values - raw) / s.sigma
+        wide = np.hypot(1.0, (raw - raw[:, :1]) / s.sigma)
         each = np.where(late, 2.0 * np.log(wide) + 2.0 * np.log1p((z / wide) ** 2), z**2)
-        total += _worth(s) * float(np.sum(each))
+        total += _worth(s) * np.sum(each, axis=1)
     return total
 
 
@@ -227,8 +245,8 @@ def _is_free_fall(problem: Problem, r: int, raw: Array | None, shift: float) -> 
     if raw is None:
         return False
     z = [
-        ((s.values - raw[part]) / s.sigma)[e.recording.time[s.rows] <= e.simulator.contact + shift]
-        for s, part in e.spans()
+        ((s.values - raw[part]) / s.sigma)[time <= e.simulator.contact + shift]
+        for time, (s, part) in zip(e.times, e.spans(), strict=True)
     ]
     return bool(np.median(np.abs(np.concatenate([np.zeros(1), *z]))) < TUNING.quiet_median)
 
@@ -238,14 +256,16 @@ def _worth(s: Signal) -> float:
     return max(1.0 - sum(s.ar), 0.05) / (1.0 + max(sum(s.ar), 0.0))
 
 
-def _early(problem: Problem, r: int, raw: Array, shift: float) -> float:
+def _early(problem: Problem, r: int, raws: Array, shifts: Array) -> Array:
     """What is left of it by those up to shortly after the first contact, coloured ones for what they are worth."""
     e = problem.dataset[r]
-    total = (shift / e.shift_prior) ** 2
-    for s, part in e.spans():
-        time = e.recording.time[s.rows] - shift - e.simulator.contact
-        after = time[time > 0.0][TUNING.early_samples - 1 : TUNING.early_samples]
-        inside = time < max([TUNING.early_window, *after])  # a record may end before
-        sigma = np.hypot(s.sigma, TUNING.model_error * (raw[part] - raw[part][0]))
-        total += _worth(s) * float(np.sum((((s.values - raw[part]) / sigma)[inside]) ** 2))
+    total = _prior(e, shifts)
+    for stamps, (s, part) in zip(e.times, e.spans(), strict=True):
+        raw, times = raws[:, part], stamps - shifts[:, None] - e.simulator.contact
+        sigma = np.hypot(s.sigma, TUNING.model_error * (raw - raw[:, :1]))
+        each, worth = ((s.values - raw) / sigma) ** 2, _worth(s)
+        for k, time in enumerate(times):
+            after = time[time > 0.0][TUNING.early_samples - 1 : TUNING.early_samples]
+            inside = time < max([TUNING.early_window, *after])  # a record may end before
+            total[k] += worth * float(np.sum(each[k][inside]))
     return total

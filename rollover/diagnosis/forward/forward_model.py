@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -19,7 +19,7 @@ from rollover.dynamics.drop_test import BESIDE, DropFailedError, DropModel, Trac
 from rollover.effects import every, read
 from rollover.recording import Recording
 from rollover.scenario import Scenario
-from rollover.spec.document import exchanged
+from rollover.spec.document import Itself, exchanged
 from rollover.spec.initiation import Drop
 
 Array = NDArray[np.float64]
@@ -240,10 +240,27 @@ def simulator_of(scenario: Scenario, recording: Recording, *, discontinuities: b
 
 
 def set_up(scenario: Scenario, recording: Recording) -> Scenario:
-    """The scenario under a recording's conditions; what these leave as it is, is the same. Raises `InputError`."""
+    """The scenario under a recording's conditions; what these leave as it is, is the same. Raises `InputError`.
+
+    Asked again for the same, it is the same object.
+    """
     if not recording.conditions:
         return scenario
-    found = scenario.replaced(dict(recording.conditions), origin=recording.title)
+    conditions = tuple((path, type(value), value) for path, value in recording.conditions.items())
+    try:
+        hash(conditions)
+    except TypeError:  # a value without a hash
+        return _under(scenario, recording.conditions, recording.title)
+    return _kept_under(Itself(scenario), conditions, recording.title)
+
+
+@lru_cache(maxsize=TUNING.kept_scenarios)  # each stage of a diagnosis asks for it, and reading values takes 10 ms
+def _kept_under(scenario: Itself, conditions: tuple[tuple[str, type, Any], ...], title: str) -> Scenario:
+    return _under(scenario.thing, {path: value for path, _, value in conditions}, title)
+
+
+def _under(scenario: Scenario, conditions: Mapping[str, Any], title: str) -> Scenario:
+    found = scenario.replaced(dict(conditions), origin=title)
     own = {f.name: (getattr(scenario, f.name), getattr(found, f.name)) for f in fields(found)}
     return replace(found, **{name: old for name, (old, new) in own.items() if new == old})
 

@@ -12,17 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.compiled import leaf
 from ground.law import REFERENCE_AREA, along
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
 from rollover.diagnosis.forward.filtering import filtered_like, rows_of
 from rollover.diagnosis.inference.bases import linear_b_splines
+from rollover.diagnosis.inference.newmark import newmark_response
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import DropModel
 from rollover.scenario import Scenario
@@ -70,19 +70,6 @@ class Way:
         newmark_response(np.ascontiguousarray(sign * f / self.whole), self.stiffness / self.whole, TUNING.step, z, v, a)
         felt = -self.mass * a if where == "ground" else f - self.mass * a
         return z, v, a, felt
-
-
-@leaf
-def newmark_response(push: Any, k: Any, h: float, z: Any, v: Any, a: Any) -> None:
-    """z'' = push - k z for each column of accelerations (n, m), by Newmark's rule; z and v begin as they are given."""
-    for j in range(push.shape[1]):
-        a[0, j] = push[0, j]
-    for i in range(1, push.shape[0]):
-        for j in range(push.shape[1]):
-            ahead = z[i - 1, j] + h * v[i - 1, j] + 0.25 * h * h * a[i - 1, j]
-            a[i, j] = (push[i, j] - k[i] * ahead) / (1.0 + 0.25 * h * h * k[i])
-            z[i, j] = ahead + 0.25 * h * h * a[i, j]
-            v[i, j] = v[i - 1, j] + 0.5 * h * (a[i - 1, j] + a[i, j])
 
 
 def channels_of(way: Way, moves: Moves, e: Dataset, shift: float) -> Array:

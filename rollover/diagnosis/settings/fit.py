@@ -175,6 +175,7 @@ class TimeShift:
 
     search_width: float = 3.0  # standard deviations of the prior: half width of the search; chosen
     search_count: int = 241  # time shifts that are tried; chosen
+    search_at_once: int = 16  # of them that are compared in one go, so that runs stay in the cache; chosen
     quiet_median: float = 2.0  # noise units: median misfit of a fall, up to which it is met; chosen
     model_error: float = 0.1  # share of a channel's change: error of the model soon after the contact; chosen
     # standard deviations of the prior: larger shifts are the model's fault where the clock's zero is known; chosen

@@ -84,6 +84,7 @@ class Drop:
     track_margin: float = 0.02  # s: a drop is simulated longer by it, since clocks are moved; chosen
     kept_predictions: int = 128  # kept predictions of one recording; chosen
     kept_tracks: int = 16  # kept drops of one recording; chosen
+    kept_scenarios: int = 64  # kept scenarios under conditions, of more recordings than are fitted at once; chosen
 
 
 @dataclass(frozen=True, kw_only=True)
