@@ -27,7 +27,7 @@ from rollover.recording.importers.importer import Importer
 from rollover.recording.importers.sidecar import DATE_TIME, Column, Described, Profile
 from rollover.recording.importers.signals import Signal, assemble
 from rollover.recording.importers.soundness import RATE_INSTEAD
-from rollover.recording.tables import csv_heading, first_rows, is_number, line_of_row, read_columns
+from rollover.recording.tables import blank_lines, csv_heading, first_rows, is_number, line_of_row, read_columns
 from rollover.recording.text_rows import Dialect
 from rollover.system.errors import Fault, InputError
 
@@ -80,6 +80,10 @@ def read(path: Path, profile: Described | None) -> Recording:
         if note:
             notes = [*notes, note]
             clock = clock if "clock" in profile.stated else Clock(zero="unknown")
+    if profile.about.rate is not None and (blank := blank_lines(path, dialect)):
+        what = f"{len(blank)} blank lines between rows of numbers, which `rate` counts as no samples"
+        cure = "a gap, such as NaN, for each sample that is missing"
+        raise InputError(Fault(file=str(path), line=blank[0], message=f"{what}; {cure}"))
     about = replace(profile.about, clock=clock, notes=(*profile.about.notes, *notes))
     by = replace(profile, about=about, columns=columns)
     return assemble(path, signals, by, line=lambda row: line_of_row(path, row, dialect))

@@ -20,6 +20,8 @@ from rollover.system.budget import Budget
 
 _RUNS_OVER = {2: "angle", 3: "distance", 4: "an index"}  # what a group's master may be instead of time
 
+_ALL_INVALID = 1  # flag of a channel of MDF 4, beside or instead of a bit for each sample
+
 
 def _read(path: Path, profile: Described | None) -> Recording:
     check_library("asammdf", "mdf", path)
@@ -104,6 +106,8 @@ _TEXT = ("numbers made of text", "text", "text of bits")
 
 
 def _signal(raw: Any, invalid: Any, channel: Any, version: str) -> Signal:
+    if version >= "4" and int(getattr(channel, "flags", 0) or 0) & _ALL_INVALID:
+        return left_out("all invalid")
     physical = converted(raw, channel.conversion, version)
     values, notes = physical.values, []
     if physical.texts:
