@@ -15,6 +15,7 @@ from rollover.recording.importers.importer import Importer, check_library, libra
 from rollover.recording.importers.mdf_conversions import converted
 from rollover.recording.importers.sidecar import Described
 from rollover.recording.importers.signals import Signal, assemble, left_out
+from rollover.spec.channels import factor
 from rollover.system.boundary import worded
 from rollover.system.budget import Budget
 
@@ -132,7 +133,13 @@ def _time(file: Any, group: int, stamps: Any) -> tuple[Any, str]:
     at = file.masters_db.get(group)
     if at is None:
         return None, ""  # asammdf counts samples there
-    return stamps, _RUNS_OVER.get(int(getattr(file.groups[group].channels[at], "sync_type", 0) or 0), "")
+    master = file.groups[group].channels[at]
+    unit = str(master.unit or "").strip() or "s"
+    over = _RUNS_OVER.get(int(getattr(master, "sync_type", 0) or 0), "")
+    try:
+        return stamps * factor(unit, "time"), over  # seconds by the format, and some write others
+    except ValueError:
+        return stamps, over or f"a time in {unit!r}"
 
 
 MDF = Importer(

@@ -78,7 +78,8 @@ def _beside_scale(found: Signal, channel: Any) -> Signal:
     own = {key: value for key, value in channel.properties.items() if not key.startswith(("NI_", "wf_"))}
     said = cf.stated_scale(own)
     is_scaled = any(key.endswith("]_Scale_Type") for key in channel.properties)
-    if not said or found.began is not None and found.time is None:
+    is_clock = found.began is not None and found.time is None
+    if not said or is_clock:
         return found
     if np.dtype(channel.dtype).kind in "iu" and not is_scaled:
         what = f"whole numbers beside {said}, which TDMS does not define; `scale`, `offset` of a profile say it"

@@ -8,13 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 START = "wf_start_time"
-MATTERS = ("wf_increment", "wf_start_offset", "wf_xunit_string", "unit_string")  # and scales, which begin with NI_
+MATTERS = ("wf_increment", "wf_start_offset", "wf_xunit_string", "unit_string")
+SCALES = ("NI_Scale[", "NI_Number_Of_Scales", "NI_Scaling_Status")
 ON_TIME = 1.0  # step: a start that is written again lies as near to where the samples have come
 
 
@@ -32,7 +34,7 @@ def pieces_of(nptdms: Any, path: Path) -> Pieces:
     changed: dict[str, str] = {}
 
     class Reader(nptdms.reader.TdmsReader):  # type: ignore[misc]
-        counts: dict[str, int] = {}
+        counts: Mapping[str, int] = MappingProxyType({})  # values before the piece that is being read
 
         def _update_object_metadata(self, segment: Any) -> None:
             self.counts = {path: about.num_values for path, about in self.object_metadata.items()}
@@ -48,7 +50,7 @@ def pieces_of(nptdms: Any, path: Path) -> Pieces:
                         said, at = starts.setdefault(name, []), self.counts.get(name, 0)
                         said[:] = [*(one for one in said if one[0] != at), (at, value)]
                     is_new = written and self.counts.get(name, 1) > 0 and not is_same
-                    if is_new and (key in MATTERS or key.startswith("NI_")):
+                    if is_new and (key in MATTERS or key.startswith(SCALES)):
                         changed.setdefault(name, f"{key} changes within the file, got {known.get(key)} and {value}")
             super()._update_object_properties(segment_object_properties)
 

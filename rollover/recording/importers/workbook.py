@@ -35,7 +35,8 @@ class Moment:
 def read_workbook(path: Path, *, empty: bool = False) -> Mapping[str, list[Row]]:
     """Rows of each sheet by its name, numbers as they were last worked out. Raises `InputError`.
 
-    With `empty`, rows without a value that lie between others are there too, of no cells. What counts is the content: an `.xlsx` that is named `.xls` is read too.
+    With `empty`, rows without a value that lie above others are there too, of no cells. What counts is the content: an
+    `.xlsx` that is named `.xls` is read too.
     """
     check_library("openpyxl", "xlsx", path)
     sheets = apart(_rows, path, what="Excel", modules=("openpyxl",))

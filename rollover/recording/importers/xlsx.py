@@ -153,8 +153,8 @@ def _without_rounding(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
     """Nanoseconds; of moments that lie within what a number of days rounds to on a grid, those of the grid."""
     for step in (1e-3, 1e-4, 1e-5):
         if np.all(np.abs(seconds - np.round(seconds / step) * step) < TICK):
-            return np.asarray(np.round(seconds / step) * round(step * NANO), dtype=np.int64)
-    return np.asarray(np.round(seconds * 1e6) * 1000, dtype=np.int64)
+            return np.asarray(np.round(seconds / step).astype(np.int64) * round(step * NANO))
+    return np.asarray(np.round(seconds * 1e6).astype(np.int64) * 1000)
 
 
 _OF_DAY = "times of day, of a date that is not said"
