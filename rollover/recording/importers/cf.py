@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -78,22 +78,30 @@ def of_field(attributes: Attributes, name: str, at: int, count: int) -> dict[str
     for key, value in attributes.items():
         if _is_each(value, count):
             found[key] = value.ravel()[at]
-        elif own := re.fullmatch(rf"{re.escape(name)}[_. ](.+)|(.+)[_. ]{re.escape(name)}", key):
-            found[own[1] or own[2]] = value
+        elif own := _named_for(name, key):
+            found[own] = value
         elif count == 1 or _SPELT.get(_letters(key)) in _MARKS[:2]:
             found[key] = value
     return found
 
 
-def of_which_field(attributes: Attributes, count: int) -> str:
+def of_which_field(attributes: Attributes, names: Sequence[str]) -> str:
     """Why numbers of a record cannot be read beside one scale or range for all its fields; nothing where they can."""
-    one = {key: value for key, value in attributes.items() if not _is_each(value, count)} if count > 1 else {}
+    count = len(names)
+    rest = {k: v for k, v in attributes.items() if not _is_each(v, count) and not any(_named_for(n, k) for n in names)}
+    one = rest if count > 1 else {}
     scale = stated_scale(one)
     ranges = [key for key in one if _SPELT.get(_letters(key)) in _MARKS[2:]]
     said = ", ".join([scale] * bool(scale) + ranges)
     return f"records of {count} fields beside {said}, of which is not said; `scale`, `offset` of a profile say it" * (
         said != ""
     )
+
+
+def _named_for(field: str, key: str) -> str:
+    """What `F_units` or `units_F` says of the field F; nothing of another key."""
+    match = re.fullmatch(rf"{re.escape(field)}[_. ](.+)|(.+)[_. ]{re.escape(field)}", key)
+    return (match[1] or match[2]) if match else ""
 
 
 def _letters(key: str) -> str:

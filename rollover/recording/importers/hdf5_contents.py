@@ -127,7 +127,7 @@ def _of_records(
             attributes=cf.of_field(attributes, key, at, len(fields)),
             around=(steps, *around),
             part=_part(dataset) * max(1, dataset.dtype.itemsize // 8),
-            unclear=cf.of_which_field(attributes, len(fields)),
+            unclear=cf.of_which_field(attributes, list(fields)),
         )
         for at, (key, (way, kind)) in enumerate(fields.items())
     }
