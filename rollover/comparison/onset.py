@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.comparison.misfit import as_measured, estimated_noise, sigma_of
-from rollover.comparison.registration import behind, laid_over, parts
+from rollover.comparison.registration import Part, behind, laid_over, parts
 from rollover.dynamics.drop_test import BESIDE, DropFailedError, DropModel, landing_speed, simulate_drop, unfit
 from rollover.recording import Clock, Recording
 from rollover.recording.noise_floor import LENGTH, noise_floor
@@ -40,6 +40,7 @@ Array = NDArray[np.float64]
 Simulate = Callable[[Scenario], Recording]
 Found = tuple[float, float, Method, tuple[str, ...]]
 
+DEPTH = "ground/sinkage"  # that no soil is too soft for
 KNOWN = 1e-3  # s, 1 sigma of a zero that is said to be known
 SURE = 5.0  # sigmas, beyond which a zero is not where it is said to be
 BETTER = 4.0  # times less misfit there: half the distance, as that of an error of the model is
@@ -197,11 +198,30 @@ def _is_off(recording: Recording, moved: Recording, scenario: Scenario, simulate
     if run is None:
         return False
     pairs = list(zip(parts(recording, run), parts(moved, run), strict=True))
-    here = [float(np.mean(a.off(0.0) ** 2)) for a, _ in pairs]
-    there = [float(np.mean(b.off(0.0) ** 2)) for _, b in pairs]
-    chance = [1.0 + 2.0 * math.sqrt(2.0 / a.values.size) for a, _ in pairs]  # what shows nothing goes either way
+    if _is_better(pairs, -math.inf, math.inf):
+        return True
+    # what a scenario lacks may be as much all along; not so before and about its contact, of which depth tells alone
+    contact = _contact(scenario)
+    if contact is None or DEPTH not in zero.channels:
+        return False
+    begun = contact + zero.late
+    return _is_better(pairs, min(contact, begun), begun + SOON, by=DEPTH)
+
+
+def _is_better(pairs: list[tuple[Part, Part]], start: float, end: float, *, by: str = "") -> bool:
+    """Whether every channel lies nearer to the simulation when moved, and one of them, or all together, by far.
+
+    Of the stamps as they are those from `start` to `end`, s.
+    """
+    rows = [(a.time >= start) & (a.time <= end) for a, _ in pairs]
+    if not pairs or min(int(r.sum()) for r in rows) < LEAST:
+        return False
+    here = [float(np.mean(a.off(0.0)[r] ** 2)) for (a, _), r in zip(pairs, rows, strict=True)]
+    there = [float(np.mean(b.off(0.0)[r] ** 2)) for (_, b), r in zip(pairs, rows, strict=True)]
+    chance = [1.0 + 2.0 * math.sqrt(2.0 / int(r.sum())) for r in rows]  # what shows nothing goes either way
     better = all(b < a * c for a, b, c in zip(here, there, chance, strict=True))
-    return better and sum(there) * BETTER < sum(here)
+    far = [by in ("", a.channel) for a, _ in pairs]
+    return better and float(np.dot(there, far)) * BETTER < float(np.dot(here, far))
 
 
 def _fall(scenario: Scenario, recording: Recording, simulate: Simulate) -> Recording | None:

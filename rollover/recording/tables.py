@@ -159,6 +159,22 @@ def read_words(path: Path, columns: Sequence[str], dialect: Dialect = PLAIN) -> 
     return {name: [row[names.index(name)] for row in rows if len(row) == len(names)] for name in columns}
 
 
+def blank_lines(path: Path, dialect: Dialect) -> list[int]:
+    """Lines without a cell between the first row of numbers and the last; none where one stands behind every row."""
+    between: list[list[int]] = []
+    since: list[int] = []
+    rows = -dialect.above
+    for number, text in lines_of(path, dialect, blank=True):
+        if not text.strip():
+            since.append(number)
+            continue
+        rows += 1
+        if rows > 1:
+            between.append(since)
+        since = []
+    return [] if {len(lines) for lines in between} == {1} else [number for lines in between for number in lines]
+
+
 def line_of_row(path: Path, row: int, dialect: Dialect = PLAIN) -> int:
     """Line of a CSV file on which a row of numbers stands, both for messages; the first row is 0."""
     lines = lines_of(path, dialect)

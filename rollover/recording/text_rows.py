@@ -64,8 +64,8 @@ def opened(path: Path) -> BinaryIO:
     return file
 
 
-def lines_of(path: Path, dialect: Dialect) -> Iterator[tuple[int, str]]:
-    """Lines that are neither blank nor comments, with their numbers."""
+def lines_of(path: Path, dialect: Dialect, *, blank: bool = False) -> Iterator[tuple[int, str]]:
+    """Lines that are neither blank nor comments, with their numbers; with `blank` those that are blank too."""
     plain = dialect.encoding.lower().replace("_", "-") in ("utf-8", "utf8")
     number = 0
     with opened(path) as file:
@@ -83,7 +83,7 @@ def lines_of(path: Path, dialect: Dialect) -> Iterator[tuple[int, str]]:
                 if "\0" in line or "\ufeff" in line:
                     what = "a NUL byte" if "\0" in line else "a byte order mark inside the text"
                     refuse(path, f"not a text file, got {what}; save it as UTF-8", number)
-                if line.strip() and not (dialect.comment and line.startswith(dialect.comment)):
+                if (blank or line.strip()) and not (dialect.comment and line.startswith(dialect.comment)):
                     yield number, line.rstrip("\r\n")
         except UnicodeDecodeError as e:
             refuse(path, f"not {dialect.encoding} text, got byte 0x{e.object[e.start]:02x}", number + 1)

@@ -280,7 +280,7 @@ def test_the_slope_study_s_largest_difference_is_within_scatter(tmp_path: Path) 
     found = Points(columns={name: column[130:131] for name, column in every.columns.items()})
     rows = evaluate(Builder(study), tmp_path, Way(workers=0), found)
     done = Conducted(points=found, keys=[Builder(study).key(found.row(0))], rows=rows, ran=1)
-    check = reference.checked(study, tmp_path, Way(workers=0), done)
+    check = reference.checked(study, tmp_path, Way(workers=0), done, reference.chosen(study, done))
     assert check is not None
     by_name = {output["name"]: output["largest"] for output in check["outputs"]}
     # a residual is what two sums of 1e4 J leave of each other: a tenth of it is nothing that a load would show

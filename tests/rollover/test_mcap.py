@@ -161,3 +161,36 @@ def test_header_stamps_and_arrays_of_a_ros_bag(tmp_path: Path) -> None:
     found = named(tmp_path / "bag", {"/joints.header.stamp": "time", "/joints.effort.1": N})
     assert found.time == pytest.approx(np.arange(4) * 2e-3, abs=1e-12)
     assert found[FORCE] == pytest.approx(10.0 * np.arange(4))
+
+
+def published(path: Path, sources: str) -> Path:
+    """One topic, whose messages come by several channels, in this order."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema(name="x", encoding="jsonschema", data=b"{}")
+        ids = {
+            one: writer.register_channel(topic="/f", message_encoding="json", schema_id=schema, metadata={"by": one})
+            for one in sorted(set(sources))
+        }
+        for k, one in enumerate(sources):
+            stamp = BEGAN + k * 1_000_000
+            data = json.dumps({"v": float(k) if one == "a" else -99.0}).encode()
+            writer.add_message(channel_id=ids[one], log_time=stamp, publish_time=stamp, data=data)
+        writer.finish()
+    return path
+
+
+def test_publishers_of_one_topic_are_not_mixed(tmp_path: Path) -> None:
+    for sources in ("abab", "aaba"):
+        with pytest.raises(InputError, match=r"messages of 2 publishers at the same time, got /f"):
+            named(published(tmp_path / "a.mcap", sources), {"/f.v": N})
+    one_after_the_other = named(published(tmp_path / "b.mcap", "aaabb"), {"/f.v": N})  # a recorder begun anew
+    assert one_after_the_other[FORCE] == pytest.approx([0, 1, 2, -99, -99])
+
+
+def test_counts_of_64_bits_as_text(tmp_path: Path) -> None:
+    messages = [("/f", 7 * k, {"at": str(BEGAN + k * 1_000_000 + 1), "v": float(k)}) for k in range(4)]
+    found = named(write(tmp_path / "a.mcap", *messages), {"/f.at": "time, unit: ns", "/f.v": N})
+    assert found.time == pytest.approx(1e-3 * np.arange(4), abs=1e-12)
+    assert "time counts from 2024-05-01T08:00:00.000000001Z" in found.notes

@@ -206,3 +206,31 @@ def test_a_profiles_time_channel_holds_for_its_group(tmp_path: Path) -> None:
     assert found.time == pytest.approx(2.0 * TIME)
     assert found.clock.zero == "unknown"
     assert "gps: a column of time that no column goes by" in named(path, {"gps": "time", "z": SINKAGE}).notes
+
+
+def test_a_channel_whose_flag_says_that_all_is_invalid(tmp_path: Path) -> None:
+    with MDF(version="4.10") as file:
+        file.append([signal("F"), signal("z", unit="m")])
+        file.groups[0].channels[1].flags |= 1
+        file.save(tmp_path / "a.mf4", overwrite=True)
+    assert "1 of 2 columns left out, without a description: F" in named(tmp_path / "a.mf4", {"z": SINKAGE}).notes
+    with pytest.raises(InputError, match=r"channels.F: not a column of numbers over time: all invalid"):
+        named(tmp_path / "a.mf4", {"F": FORCE})
+
+
+@pytest.mark.parametrize(("unit", "times"), [("ms", 1e-3), ("us", 1e-6), ("s", 1.0), ("", 1.0)])
+def test_a_master_in_another_unit_than_seconds(tmp_path: Path, unit: str, times: float) -> None:
+    with MDF(version="4.10") as file:
+        file.append([signal("F")])
+        file.groups[0].channels[0].unit = unit
+        file.save(tmp_path / "a.mf4", overwrite=True)
+    assert named(tmp_path / "a.mf4", {"F": FORCE}).time == pytest.approx(times * TIME)
+
+
+def test_a_master_in_no_unit_of_time_is_refused(tmp_path: Path) -> None:
+    with MDF(version="4.10") as file:
+        file.append([signal("F")])
+        file.groups[0].channels[0].unit = "mm"
+        file.save(tmp_path / "a.mf4", overwrite=True)
+    with pytest.raises(InputError, match="its group runs over a time in 'mm', not over time"):
+        named(tmp_path / "a.mf4", {"F": FORCE})

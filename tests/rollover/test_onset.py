@@ -121,6 +121,21 @@ def test_a_clearly_wrong_clock_is_set_though_stated_known(late: float) -> None:
     assert zero.late == pytest.approx(late, abs=5.0 * zero.sigma)
 
 
+@pytest.mark.parametrize("late", [0.019, -0.025, 0.4])
+@pytest.mark.parametrize(
+    "lacks", ["effects.soil-viscous-damping.damping", "effects.soil-stiffness.scale", "effects.soil-crust.thickness"]
+)
+def test_a_clearly_wrong_clock_is_set_beside_what_the_scenario_lacks(late: float, lacks: str) -> None:
+    """The whole drop is hardly nearer on the right clock: what it says before and about its contact is."""
+    value = {"effects.soil-viscous-damping.damping": 250.0, "effects.soil-stiffness.scale": 2.0}.get(lacks, 0.05)
+    more = {"effects.soil-crust.stiffness_ratio": 3.0} if "crust" in lacks else {}
+    made = drop(3, 1.5, changes={lacks: value, **more})
+    zero = timed("d", on(made, late, Clock()), under(made)).zero
+    assert zero is not None
+    assert zero.late == pytest.approx(late, abs=5.0 * zero.sigma)
+    assert timed("d", made, under(made)).zero is None
+
+
 def test_one_late_channel_is_no_late_clock() -> None:
     """The depth gauge 30 ms late, the load cell and the accelerometer not: an instrument's fault."""
     made, late = drop(), drop()

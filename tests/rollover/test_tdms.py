@@ -159,3 +159,57 @@ def test_all_that_a_file_holds_is_counted(tmp_path: Path) -> None:
     assert "text: g/text" in said
     assert "empty: g/void" in said
     assert "without a description: h/spare" in said
+
+
+def appended(path: Path, *pieces: tuple[Any, dict[str, Any]]) -> Path:
+    """One channel, written piece by piece, each with properties of its own."""
+    with TdmsWriter(str(path)) as file:
+        for values, how in pieces:
+            file.write_segment([ChannelObject("g", FORCE, values, properties=how)])
+    return path
+
+
+def started(seconds: float) -> dict[str, Any]:
+    return wave(wf_start_time=START + np.timedelta64(round(seconds * 1e6), "us"))
+
+
+def test_pieces_keep_their_own_starts(tmp_path: Path) -> None:
+    found = read_recording(appended(tmp_path / "a.tdms", (RAW, started(0.0)), (RAW, started(10.0))))
+    assert found.time == pytest.approx([0.0, 0.001, 0.002, 0.003, 10.0, 10.001, 10.002, 10.003], abs=1e-12)
+    assert "time counts from 2024-05-01T10:00:00.000000000Z" in found.notes
+    assert f"g/{FORCE}: 2 pieces by their wf_start_time, at 0, 10 s" in found.notes
+    again = read_recording(appended(tmp_path / "b.tdms", (RAW, started(0.0)), (RAW, started(0.0))))
+    assert again.time == pytest.approx(1e-3 * np.arange(8))  # repeated, not started anew
+    late = read_recording(appended(tmp_path / "c.tdms", (RAW, started(0.0)), (RAW, started(0.0043))))
+    assert late.time == pytest.approx(1e-3 * np.arange(8))  # a clock that is asked again, within a sample
+    with pytest.raises(InputError, match="its 2 pieces overlap in time by their wf_start_time"):
+        read_recording(appended(tmp_path / "d.tdms", (RAW, started(10.0)), (RAW, started(0.0))))
+
+
+@pytest.mark.parametrize(
+    ("key", "first", "second"),
+    [
+        ("wf_increment", wave(), wave(wf_increment=2e-3)),
+        ("unit_string", wave(), wave(unit_string="kN")),
+        (
+            r"NI_Scale\[0\]_Linear_Slope",
+            scaled("Linear", Linear_Slope=2.0, Linear_Y_Intercept=0.0, Linear_Input_Source=0xFFFFFFFF),
+            scaled("Linear", Linear_Slope=4.0, Linear_Y_Intercept=0.0, Linear_Input_Source=0xFFFFFFFF),
+        ),
+    ],
+)
+def test_what_changes_from_piece_to_piece_is_refused(tmp_path: Path, key: str, first: Any, second: Any) -> None:
+    with pytest.raises(InputError, match=rf"{key} changes within the file, got"):
+        read_recording(appended(tmp_path / "a.tdms", (RAW, first), (RAW, second)))
+
+
+def test_properties_that_look_like_a_scale_or_a_unit(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.tdms", ("g", FORCE, RAW, wave(Gain=0.5)))
+    with pytest.raises(InputError, match=r"whole numbers beside Gain 0.5, which TDMS does not define"):
+        read_recording(path)
+    assert peak(named(path, {f"g/{FORCE}": f"{FORCE}, scale: 0.5"})) == 899.5
+    real = read_recording(write(tmp_path / "b.tdms", ("g", FORCE, RAW.astype("f8"), wave(Gain=0.5))))
+    assert peak(real) == 1799.0
+    assert any("Gain 0.5 stands beside its numbers, and is not applied" in note for note in real.notes)
+    other = {"wf_increment": 1e-3, "NI_UnitDescription": "kN"}
+    assert peak(read_recording(write(tmp_path / "c.tdms", ("g", FORCE, RAW, other)))) == 1.799e6

@@ -286,3 +286,21 @@ def test_a_reader_that_has_found_a_fault_holds_nothing_any_more(
         time.sleep(0.002)
         held.clear()
     assert alive == 0
+
+
+@pytest.mark.parametrize("name", ["F/kN", "F in kN", "F {kN}", "F (front) [kN]", "Kraft [kN] links", "F [kN] (left)"])
+def test_a_unit_anywhere_in_a_name_counts(tmp_path: Path, name: str) -> None:
+    text = f"t,{name}\n0.0,1\n0.1,2\n"
+    channels = f'  t: {{channel: time, unit: s}}\n  "{name}": {{channel: rops/force}}\n'
+    assert read(tmp_path, "a.csv", text, channels)[FORCE].tolist() == [1000.0, 2000.0]
+    with pytest.raises(InputError, match="unit: the file states 'kN', got 'N'"):
+        read(tmp_path, "a.csv", text, channels.replace("rops/force", "rops/force, unit: N"))
+
+
+@pytest.mark.parametrize("blank", ["\n", "  \n", "\n\n"])
+def test_blank_lines_are_no_samples_that_a_rate_may_count(tmp_path: Path, blank: str) -> None:
+    channels = "  F: {channel: rops/force, unit: N}\n"
+    with pytest.raises(InputError, match=r"a.csv:4: \d blank lines between rows of numbers, which `rate` counts"):
+        read(tmp_path, "a.csv", f"F\n1\n2\n{blank}3\n4\n", channels, more="rate: 10\n")
+    for text in (f"F\n1\n2\n3\n{blank}", f"F\n{blank}1\n2\n3\n", "F\n\n1\n\n2\n\n3\n", "F\n1\n# then\n2\n3\n"):
+        assert read(tmp_path, "a.csv", text, channels, more="rate: 10\n")[FORCE].tolist() == [1, 2, 3]

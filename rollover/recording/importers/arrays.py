@@ -35,6 +35,7 @@ class Array:
     last_axis_first: bool = False  # whether the writer's rows are the file's columns, as MATLAB's
     part: int = 0  # numbers that are unpacked at a time, be it for one of them
     reason: str = ""  # why it is no numbers
+    unclear: str = ""  # why it cannot be said what its numbers stand for
 
     @property
     def claim(self) -> int:
@@ -118,13 +119,31 @@ def _has_time(profile: Described | None, name: str) -> bool:
     return any(not group or name.startswith((f"{group}/", f"{group}.")) for group in groups)
 
 
+def _scale_around(thing: Array) -> tuple[str, str]:
+    """Why packed numbers cannot be read beside what their attributes or their group's say; and what is only to be said.
+
+    A group's scale is no convention: it may be that of one of its arrays, or of all.
+    """
+    unknown = cf.unknown_scale(thing.attributes, thing.dtype)
+    own = cf.other_scales(thing.attributes) or cf.beside(thing.attributes)
+    groups = [said for level in thing.around if level is not thing.attributes and (said := cf.stated_scale(level))]
+    if not groups or cf.stated_scale(thing.attributes):
+        return unknown, own
+    said = f"{groups[0]} of its group"
+    if thing.dtype.kind in "iu":
+        return f"whole numbers beside {said}, which no convention defines; `scale`, `offset` of a profile say it", ""
+    return unknown, said
+
+
 def _signal(thing: Array, index: Index, place: tuple[int, int], profile: Described | None, name: str) -> Signal:
     given = None if profile is None else profile.columns[name]
-    states_scale = given is not None and (given.scale != 1.0 or given.offset != 0.0)
-    unknown = "" if states_scale else cf.unknown_scale(thing.attributes, thing.dtype)
+    states_scale = profile is not None and name in profile.scaled
+    unknown, beside = ("", "") if states_scale else _scale_around(thing)
+    if thing.unclear and not states_scale and not (given and given.channel == "time" and thing.dtype.kind == "f"):
+        unknown = thing.unclear
     try:
-        values, notes = cf.decoded(np.asarray(thing.load(index)), thing.attributes, thing.fill)
-        if not states_scale and thing.dtype.kind == "f" and (beside := cf.other_scales(thing.attributes)):
+        values, notes = cf.decoded(np.asarray(thing.load(index)), thing.attributes, thing.fill, place)
+        if beside:
             notes.append(f"{beside} stands beside its numbers, and is not applied; `scale` of a profile does")
         unit = cf.unit_of(thing.attributes, *place)
         if (since := cf.time_of(values, thing.attributes)) is not None:

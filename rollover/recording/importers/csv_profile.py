@@ -27,8 +27,10 @@ from rollover.recording.importers.importer import Importer
 from rollover.recording.importers.sidecar import DATE_TIME, Column, Described, Profile
 from rollover.recording.importers.signals import Signal, assemble
 from rollover.recording.importers.soundness import RATE_INSTEAD
-from rollover.recording.tables import csv_heading, first_rows, is_number, line_of_row, read_columns
+from rollover.recording.tables import blank_lines, csv_heading, first_rows, is_number, line_of_row, read_columns
 from rollover.recording.text_rows import Dialect
+from rollover.spec import units
+from rollover.spec.channels import UNITS
 from rollover.system.errors import Fault, InputError
 
 Words = Mapping[str, list[str | None]]
@@ -80,6 +82,10 @@ def read(path: Path, profile: Described | None) -> Recording:
         if note:
             notes = [*notes, note]
             clock = clock if "clock" in profile.stated else Clock(zero="unknown")
+    if profile.about.rate is not None and (blank := blank_lines(path, dialect)):
+        what = f"{len(blank)} blank lines between rows of numbers, which `rate` counts as no samples"
+        cure = "a gap, such as NaN, for each sample that is missing"
+        raise InputError(Fault(file=str(path), line=blank[0], message=f"{what}; {cure}"))
     about = replace(profile.about, clock=clock, notes=(*profile.about.notes, *notes))
     by = replace(profile, about=about, columns=columns)
     return assemble(path, signals, by, line=lambda row: line_of_row(path, row, dialect))
@@ -120,9 +126,15 @@ def _dialect(path: Path, profile: Described) -> tuple[Dialect, list[str]]:
 
 
 def in_brackets(name: str) -> str:
-    """Unit that a name of a column ends in, as in Force [kN]; else nothing."""
-    match = re.fullmatch(r"[^\[(]*[\[(](?!column \d)(.*)[\])]", name)
-    return match[1] if match else ""
+    """Unit that a name of a column holds, as Force [kN], F (front) [kN], F/kN or F in kN; else what it ends in in
+    brackets, or nothing.
+    """
+    own = re.sub(r"\s*\(column \d+\)$", "", name)
+    told = [*reversed(re.findall(r"[\[({]([^\[\](){}]*)[\])}]", own)), *re.findall(r"(?:.*/| in )([^/ ]+)$", own)]
+    match = re.fullmatch(r"[^\[(]*[\[(](.*)[\])]", own)
+    told = [match[1], *told] if match else told
+    known = (unit for unit in told if any(units.find(unit, table, {}) is not None for table in UNITS.values()))
+    return next(known, match[1] if match else "")
 
 
 def _refuse_twins(profile: Described, names: list[str]) -> None:

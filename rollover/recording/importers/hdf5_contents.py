@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rollover.recording.importers import cf
 from rollover.recording.importers.arrays import Array
 from rollover.recording.importers.columns import Index, no_numbers, text
 from rollover.system.budget import Budget
@@ -107,19 +108,29 @@ def _arrays(
     if text(attributes.get("NAME", "")).startswith("This is a netCDF dimension but not a netCDF variable"):
         return {name: "a dimension without coordinates"}
     if dataset.dtype.names is not None and set(dataset.dtype.names) != {"real", "imag"}:
-        return {
-            f"{name}.{key}": Array(
-                shape=(*dataset.shape, *kind.shape),
-                dtype=kind.base,
-                load=_field_of(dataset, way),
-                around=(attributes, *around),
-                part=_part(dataset) * max(1, dataset.dtype.itemsize // 8),
-            )
-            for key, (way, kind) in _fields(dataset.dtype).items()
-        }
+        return _of_records(name, dataset, attributes, around)
     if reason := _no_numbers(h5py, dataset, matlab):
         return {name: reason}
     return {name: _array(h5py, dataset, attributes, around)}
+
+
+def _of_records(
+    name: str, dataset: Any, attributes: Mapping[str, Any], around: Sequence[Mapping[str, Any]]
+) -> dict[str, Array | str]:
+    fields = _fields(dataset.dtype)
+    steps = {k: v for k, v in attributes.items() if not cf.stated_scale({k: v})}  # a step of time is that of all fields
+    return {
+        f"{name}.{key}": Array(
+            shape=(*dataset.shape, *kind.shape),
+            dtype=kind.base,
+            load=_field_of(dataset, way),
+            attributes=cf.of_field(attributes, key, at, len(fields)),
+            around=(steps, *around),
+            part=_part(dataset) * max(1, dataset.dtype.itemsize // 8),
+            unclear=cf.of_which_field(attributes, list(fields)),
+        )
+        for at, (key, (way, kind)) in enumerate(fields.items())
+    }
 
 
 def _no_numbers(h5py: Any, dataset: Any, matlab: str) -> str:

@@ -43,12 +43,12 @@ def _signals(path: Path, profile: Described | None) -> tuple[dict[str, Signal], 
     messages = Messages(path, profile)
     others: dict[str, str] = {}  # topic -> how its messages are written, which is not read
     with reading(path, "MCAP or ROS bag"):
-        for logged, topic, message in _json(path, others) if starts_with(path, _MCAP) else _ros(path):
-            messages.add(topic, logged, message)
+        for logged, topic, source, message in _json(path, others) if starts_with(path, _MCAP) else _ros(path):
+            messages.add(topic, logged, message, source)
     return messages.signals(), others
 
 
-def _json(path: Path, others: dict[str, str]) -> Iterator[tuple[int, str, Any]]:
+def _json(path: Path, others: dict[str, str]) -> Iterator[tuple[int, str, int, Any]]:
     reader = library("mcap.reader", "mcap", path)
     with path.open("rb") as file:
         claimed = Budget(path)
@@ -59,7 +59,7 @@ def _json(path: Path, others: dict[str, str]) -> Iterator[tuple[int, str, Any]]:
             if channel.message_encoding != "json":
                 others[channel.topic] = channel.message_encoding
                 continue
-            yield message.log_time, channel.topic, json.loads(message.data)
+            yield message.log_time, channel.topic, channel.id, json.loads(message.data)
 
 
 def _unpacked(file: BinaryIO) -> Iterator[int]:
@@ -82,11 +82,11 @@ def _unpacked(file: BinaryIO) -> Iterator[int]:
         file.seek(length, 1)
 
 
-def _ros(path: Path) -> Iterator[tuple[int, str, Any]]:
+def _ros(path: Path) -> Iterator[tuple[int, str, int, Any]]:
     rosbags = library("rosbags.highlevel", "mcap", path)
     with rosbags.AnyReader([path]) as reader:
         for connection, stamp, raw in reader.messages():
-            yield stamp, connection.topic, reader.deserialize(raw, connection.msgtype)
+            yield stamp, connection.topic, connection.id, reader.deserialize(raw, connection.msgtype)
 
 
 MCAP = Importer(name="mcap", meaning="MCAP with JSON messages, ROS 1 and 2 bags", sniff=_sniff, read=_read)

@@ -15,10 +15,13 @@ from rollover.recording.importers.importer import Importer, check_library, libra
 from rollover.recording.importers.mdf_conversions import converted
 from rollover.recording.importers.sidecar import Described
 from rollover.recording.importers.signals import Signal, assemble, left_out
+from rollover.spec.channels import factor
 from rollover.system.boundary import worded
 from rollover.system.budget import Budget
 
 _RUNS_OVER = {2: "angle", 3: "distance", 4: "an index"}  # what a group's master may be instead of time
+
+_ALL_INVALID = 1  # flag of a channel of MDF 4, beside or instead of a bit for each sample
 
 
 def _read(path: Path, profile: Described | None) -> Recording:
@@ -104,6 +107,8 @@ _TEXT = ("numbers made of text", "text", "text of bits")
 
 
 def _signal(raw: Any, invalid: Any, channel: Any, version: str) -> Signal:
+    if version >= "4" and int(getattr(channel, "flags", 0) or 0) & _ALL_INVALID:
+        return left_out("all invalid")
     physical = converted(raw, channel.conversion, version)
     values, notes = physical.values, []
     if physical.texts:
@@ -128,7 +133,13 @@ def _time(file: Any, group: int, stamps: Any) -> tuple[Any, str]:
     at = file.masters_db.get(group)
     if at is None:
         return None, ""  # asammdf counts samples there
-    return stamps, _RUNS_OVER.get(int(getattr(file.groups[group].channels[at], "sync_type", 0) or 0), "")
+    master = file.groups[group].channels[at]
+    unit = str(master.unit or "").strip() or "s"
+    over = _RUNS_OVER.get(int(getattr(master, "sync_type", 0) or 0), "")
+    try:
+        return stamps * factor(unit, "time"), over  # seconds by the format, and some write others
+    except ValueError:
+        return stamps, over or f"a time in {unit!r}"
 
 
 MDF = Importer(

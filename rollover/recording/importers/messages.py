@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -12,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.recording.importers import stamps
-from rollover.recording.importers.sidecar import Described
+from rollover.recording.importers.sidecar import DATE_TIME, Described
 from rollover.recording.importers.signals import Signal, left_out
 from rollover.system.budget import Budget
 from rollover.system.errors import InputError
 
 _LONGEST = 256  # entries of an array that become columns unasked: joints and wheels are fewer, scans and images more
 _COUNTED = 1000  # values after which their sum is looked at
+_TURNS = 1000  # of publishers of a topic that are kept in mind
 _IN_LIST = 40  # bytes that a value takes: a Python number, its place in two lists
 _SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nanosecs", "nsec", "nsecs")
 
@@ -58,11 +60,15 @@ class Messages:
         self._logged: dict[str, list[int]] = {}
         self._stamps_in: dict[str, str] = {}  # topic -> the first of its fields that is a stamp
         self._topic_of: dict[str, str] = {}
+        self._sources: dict[str, list[int]] = {}  # topic -> who wrote its messages, in the order of their turns
         self._count = 0
         self._claimed = Budget(path)
 
-    def add(self, topic: str, logged: int, message: Any) -> None:
-        """A message, and when it was logged, ns. Raises `InputError`."""
+    def add(self, topic: str, logged: int, message: Any, source: int = 0) -> None:
+        """A message, when it was logged, ns, and which of the topic's channels it came by. Raises `InputError`."""
+        turns = self._sources.setdefault(topic, [])
+        if source not in turns[-1:] and len(turns) < _TURNS:
+            turns.append(source)
         number = len(self._logged.setdefault(topic, []))
         self._logged[topic].append(logged)
         for name in self._times:
@@ -99,6 +105,11 @@ class Messages:
                 continue
             if not column.at:
                 found[name] = Signal(values=np.empty(0))
+                continue
+            turns = self._sources[topic]
+            if len(turns) > len(set(turns)):  # a recorder that began anew takes one turn after the other
+                who = f"{len(set(turns))} publishers at the same time"
+                found[name] = Signal(values=np.empty(0), unreadable=f"its topic has messages of {who}, got {topic}")
                 continue
             values = np.array(column.values, dtype=np.float64)
             if np.isnan(values).all():
@@ -141,6 +152,8 @@ class Messages:
             raise self._refuse(name, message)
         if all(isinstance(value, _Instant) for value in values):
             counts = [value.nanoseconds for value in values]
+        elif self._is_count(name) and all(isinstance(v, str) and re.fullmatch(r"-?\d+", v) for v in values):
+            return Signal(values=np.array([int(v) for v in values]))  # JSON has no whole numbers of 64 bits
         elif all(isinstance(value, str) for value in values):
             try:
                 counts = [stamps.instant(value) for value in values]
@@ -154,6 +167,10 @@ class Messages:
         if began < stamps.CALENDAR * stamps.NANO:  # a simulator's clock has its own zero
             return Signal(values=seconds + began / stamps.NANO, unit="s")
         return Signal(values=seconds, unit="s", began=began)
+
+    def _is_count(self, name: str) -> bool:
+        """Whether a profile says in which unit a column of time counts."""
+        return self._profile is not None and self._profile.columns[name].unit not in (None, DATE_TIME)
 
     def _refuse(self, name: str, message: str) -> InputError:
         assert self._profile is not None

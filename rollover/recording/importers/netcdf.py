@@ -5,12 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rollover.recording import Recording
 from rollover.recording.importers.apart import apart
 from rollover.recording.importers.arrays import Array, signals_of
 from rollover.recording.importers.importer import Importer, reading, starts_with
 from rollover.recording.importers.sidecar import Described
 from rollover.recording.importers.signals import Signal, assemble
+
+NEVER_WRITTEN = {  # what the format's library fills with where no `_FillValue` is stated; bytes have none
+    "i2": -32767,
+    "i4": -2147483647,
+    "f4": np.float32(9.969209968386869e36),
+    "f8": 9.969209968386869e36,
+}
 
 
 def _read(path: Path, profile: Described | None) -> Recording:
@@ -40,6 +49,7 @@ def _array(file: Any, name: str) -> Array:
         attributes=attributes,
         around=around,
         scales={axis: _array(file, key) for axis, key in coordinates.items()},
+        fill=NEVER_WRITTEN.get(variable.data.dtype.str[1:]),
     )
 
 

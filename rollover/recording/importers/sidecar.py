@@ -81,6 +81,7 @@ class Csv:
     names_row: Annotated[
         int | None,
         "which row holds the names, blank lines and comments do not count; 0: none does, columns are 1, 2, ...; "
+        "of a workbook the number of its row; "
         "left out: the first, or none if that holds nothing but numbers",
     ] = None
     units_row: Annotated[int | None, "which row holds the units, below the names"] = None
@@ -181,6 +182,7 @@ class Described:
     lines: Mapping[str, int | None]
     by_file: ByFile | None = None
     stated: frozenset[str] = frozenset()  # which of its keys the file itself gives
+    scaled: frozenset[str] = frozenset()  # columns of which it says the scale or the offset, be they 1 and 0
 
     def of(self, path: Path) -> Described:
         """This with the conditions of one file. Raises `InputError` where it has none of its own but should."""
@@ -234,6 +236,7 @@ def _described(path: Path, root: Node, kind: type[Sidecar] | type[Profile]) -> D
             faults += child.place.fault(f"conditions.{path_}", "not a value, got a mapping; write a.b: 1").faults
     columns: dict[str, Column] = {}
     lines: dict[str, int | None] = {}
+    scaled: set[str] = set()
     first: dict[str, str] = {}
     entries = root.value.get("channels")
     for name, node in entries.value.items() if entries and isinstance(entries.value, Mapping) else ():
@@ -241,6 +244,8 @@ def _described(path: Path, root: Node, kind: type[Sidecar] | type[Profile]) -> D
         if column is None:
             continue
         columns[name], lines[name] = column, node.key.line
+        if isinstance(node.value, Mapping) and {"scale", "offset"} & node.value.keys():
+            scaled.add(name)
         if column.channel in first and kind is Sidecar:  # a profile's columns may be stretches of one channel
             what = f"second column of {column.channel}, first {first[column.channel]!r}; one column a channel"
             faults += node.key.fault(f"channels.{name}", what).faults
@@ -266,6 +271,7 @@ def _described(path: Path, root: Node, kind: type[Sidecar] | type[Profile]) -> D
         lines=lines,
         by_file=by_file,
         stated=frozenset(root.value),
+        scaled=frozenset(scaled),
     )
 
 

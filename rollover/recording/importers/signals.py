@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from rollover.recording import Clock, Recording
 from rollover.recording.importers import stamps
-from rollover.recording.importers.sidecar import DATE_TIME, Column, Described, Profile, Sidecar, uncertainties_of
+from rollover.recording.importers.sidecar import DATE_TIME, Column, Csv, Described, Profile, Sidecar, uncertainties_of
 from rollover.recording.importers.soundness import Line, check_time, check_values
+from rollover.recording.tables import is_number
 from rollover.spec.channels import factor, is_known
 from rollover.system.errors import Fault, InputError, nearest
 
@@ -79,6 +80,10 @@ def assemble(
         signals = {name: _with_readable_unit(name, signal) for name, signal in signals.items()}
     by = _of_all_groups(given, signals) if given else described(signals, path)
     about = by.about
+    if isinstance(about, Profile) and about.csv.gaps:
+        signals = {
+            name: _with_gaps(signal, about.csv) if name in by.columns else signal for name, signal in signals.items()
+        }
     for name, column in by.columns.items():
         if name not in signals:
             raise by.refuse(name, f"no such column in {path.name}, got {name!r}; {_instead(name, signals)}")
@@ -238,6 +243,16 @@ def _joined(path: Path, channel: str, parts: list[_Stretch]) -> list[str]:
     time, values = (np.concatenate([getattr(p, field) for p in parts]) for field in ("time", "values"))
     parts[:] = [replace(parts[0], time=time, values=values)]
     return [f"{channel}: joined from {each}"]
+
+
+def _with_gaps(signal: Signal, how: Csv) -> Signal:
+    """The column with gaps for the numbers that the profile calls such, of any format, and their count."""
+    numbers = [float(gap.replace(how.decimal, ".")) for gap in how.gaps if is_number(gap, how.decimal)]
+    missing = np.isin(signal.values, numbers) if numbers else np.zeros(0, dtype=bool)
+    if not missing.any():
+        return signal
+    note = f"{int(missing.sum())} of {signal.values.size} values are gaps by the profile"
+    return replace(signal, values=np.where(missing, np.nan, signal.values), notes=(*signal.notes, note))
 
 
 def _with_readable_unit(name: str, signal: Signal) -> Signal:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from rollover.recording.importers import stamps
 from rollover.recording.importers.columns import number, text
+from rollover.spec import units
+from rollover.spec.channels import UNITS
 
 _STEPS: tuple[str, ...] = (
     "dt",
@@ -23,6 +25,7 @@ _STEPS: tuple[str, ...] = (
 _STEPS += ("sampling_period",)
 _RATES = ("sample_rate", "sampling_rate", "samplerate", "fs", "sample_frequency", "sampling_frequency")
 _STARTS = ("t0", "wf_start_offset", "wf_start_time")
+HERTZ = {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "1/s": 1.0, "S/s": 1.0, "kS/s": 1e3}
 _SAME = 1e-6  # relative: what a rate of six digits differs from its step
 
 
@@ -51,9 +54,23 @@ def even_stamps(around: Iterable[Mapping[str, Any]], count: int) -> tuple[NDArra
     return np.asarray(offset + step * np.arange(count), dtype=np.float64), began
 
 
+def _in_unit(level: Mapping[str, Any], key: str, known: Mapping[str, float]) -> float | None:
+    """A number in SI by the unit beside it, such as `dt_unit`. Raises ``ValueError`` for a unit of another kind."""
+    value = number(level[key])
+    unit = next((text(level[k]) for k in (f"{key}_unit", f"{key}_units", f"{key}unit") if k in level), "")
+    unit = unit or (text(level.get("time_units", level.get("time_unit", ""))) if known is UNITS["s"] else "")
+    if value is None or not unit or " since " in unit:
+        return value
+    times = units.find(unit, known, {})
+    if times is None:
+        raise ValueError(f"attribute {key}: a unit that is none of it, got {unit!r}; {', '.join(known)}")
+    return value * times
+
+
 def _step(level: Mapping[str, Any]) -> float | None:
-    steps = {key: number(level[key]) for key in _STEPS if key in level}
-    steps |= {key: 1.0 / rate for key in _RATES if key in level and (rate := number(level[key]))}
+    steps = {key: _in_unit(level, key, UNITS["s"]) for key in _STEPS if key in level}
+    rates = {key: _in_unit(level, key, HERTZ) for key in _RATES if key in level}
+    steps |= {key: 1.0 / rate for key, rate in rates.items() if rate}
     wrong = next((key for key, step in steps.items() if step is None or not 0.0 < step < np.inf), None)
     if wrong is not None:
         raise ValueError(f"attribute {wrong}: no step of time, got {level[wrong]!r}; a number above 0")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.recording import Recording
-from rollover.recording.importers import stamps
+from rollover.recording.importers import cf, stamps
 from rollover.recording.importers.apart import apart
 from rollover.recording.importers.columns import is_wanted, no_numbers
 from rollover.recording.importers.importer import Importer, check_claim, check_library, library, reading, starts_with
 from rollover.recording.importers.sidecar import Described
 from rollover.recording.importers.signals import Signal, assemble, left_out
+from rollover.recording.importers.tdms_pieces import continued, pieces_of
 from rollover.spec.channels import UNITS
 from rollover.system.boundary import worded
 from rollover.system.errors import Fault, InputError
@@ -50,6 +51,7 @@ def _signals(path: Path, profile: Described | None) -> dict[str, Signal]:
         if file.file_status.incomplete_final_segment:
             message = "cut off, got less than its last segment claims; a whole file is needed"
             raise InputError(Fault(file=str(path), message=message))
+        pieces = pieces_of(nptdms, path)
         channels = [(group, channel) for group in file.groups() for channel in group.channels()]
         check_claim(path, sum(len(channel) for _, channel in channels), most_per_byte=1.0)
         for group, channel in channels:
@@ -57,7 +59,13 @@ def _signals(path: Path, profile: Described | None) -> dict[str, Signal]:
             about = str(channel.properties.get("rollover_channel", channel.name))
             if is_wanted(profile, name, channel=about, shared=channel.name):
                 levels = (channel.properties, group.properties, file.properties)
-                signals[name] = replace(_signal(channel, levels), channel=about, shared=channel.name)
+                changed = next((c for p in (channel.path, group.path, "/") if (c := pieces.changed.get(p))), "")
+                starts = [(at, int(_nanoseconds(start))) for at, start in pieces.starts.get(channel.path, ())]
+                found = Signal(values=np.empty(0), unreadable=changed) if changed else _signal(channel, levels, starts)
+                states_scale = profile is not None and bool({name, channel.name} & profile.scaled)
+                if not found.left_out and not found.unreadable and not states_scale:
+                    found = _beside_scale(found, channel)
+                signals[name] = replace(found, channel=about, shared=channel.name)
             else:
                 is_text = channel.data_type.__name__ == "String"
                 reason = "empty" if len(channel) == 0 else "text" if is_text else ""
@@ -65,7 +73,22 @@ def _signals(path: Path, profile: Described | None) -> dict[str, Signal]:
     return signals
 
 
-def _signal(channel: Any, levels: tuple[Properties, ...]) -> Signal:
+def _beside_scale(found: Signal, channel: Any) -> Signal:
+    """A column beside a property that looks like a scale: whole numbers are counts, others may be scaled already."""
+    own = {key: value for key, value in channel.properties.items() if not key.startswith(("NI_", "wf_"))}
+    said = cf.stated_scale(own)
+    is_scaled = any(key.endswith("]_Scale_Type") for key in channel.properties)
+    is_clock = found.began is not None and found.time is None
+    if not said or is_clock:
+        return found
+    if np.dtype(channel.dtype).kind in "iu" and not is_scaled:
+        what = f"whole numbers beside {said}, which TDMS does not define; `scale`, `offset` of a profile say it"
+        return replace(found, unreadable=what)
+    note = f"{said} stands beside its numbers, and is not applied; `scale` of a profile does"
+    return replace(found, notes=(*found.notes, note))
+
+
+def _signal(channel: Any, levels: tuple[Properties, ...], starts: Sequence[tuple[int, int]]) -> Signal:
     if len(channel) == 0:
         return left_out("empty")
     scale, is_scaled = _scale_of(levels)
@@ -84,17 +107,21 @@ def _signal(channel: Any, levels: tuple[Properties, ...]) -> Signal:
     if reason := no_numbers(values.dtype):
         return left_out(reason)
     properties = levels[0]
+    notes = []
     try:
         time = _stamps(properties, values.size)
+        if time is not None and time.size > 1 and len(starts) > 1:
+            time, note = continued(time, float(time[1] - time[0]), starts)
+            notes += [note] * bool(note)
     except (ArithmeticError, AttributeError, TypeError) as e:  # of a property of another type
         return Signal(values=np.empty(0), unreadable=f"its times cannot be worked out: {worded(e)}")
     except ValueError as e:
         return Signal(values=np.empty(0), unreadable=worded(e))
-    start = properties.get("wf_start_time")
-    began: int | None = None if time is None or start is None else int(_nanoseconds(start))
+    began: int | None = None if time is None or not starts else starts[0][1]
     is_set = began is not None and began != -_FROM_1904 * stamps.NANO  # LabVIEW writes 1904 where none was set
-    unit = str(properties.get("unit_string", ""))
-    return Signal(values=values.astype(np.float64), unit=unit, time=time, began=began if is_set else None)
+    unit = str(properties.get("unit_string", "")) or cf.unit_of(properties)
+    began = began if is_set else None
+    return Signal(values=values.astype(np.float64), unit=unit, time=time, began=began, notes=tuple(notes))
 
 
 def _stamps(properties: Properties, count: int) -> NDArray[np.float64] | None:

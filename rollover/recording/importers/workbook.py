@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from rollover.recording.importers.apart import apart
 from rollover.recording.importers.importer import check_library, library, reading
@@ -15,18 +18,29 @@ from rollover.system.errors import Fault, InputError
 IN_CELLS = 5  # bytes in memory of a byte of XML: a cell has some 30 there and 150 as an object
 PLACE = 8  # bytes of a place in a row, whether or not a cell fills it
 MOST_ROWS = 1_048_576  # of a sheet, in the file format itself
-MOST_EMPTY = 100  # rows without a value, after which a sheet is over; programs write 65536 of them
+DAY = 86400.0  # s
+FROM_1970 = {1900: 25569.0, 1904: 25569.0 - 1462.0}  # days from a workbook's zero to 1970
 
 Row = tuple[Any, ...]
 
 
-def read_workbook(path: Path) -> Mapping[str, list[Row]]:
+@dataclass(frozen=True, kw_only=True)
+class Moment:
+    """A cell that holds a date or a time: days since 1970, of a time of day or of a stretch of time its own."""
+
+    kind: Literal["date", "time of day", "time"]
+    days: float
+
+
+def read_workbook(path: Path, *, empty: bool = False) -> Mapping[str, list[Row]]:
     """Rows of each sheet by its name, numbers as they were last worked out. Raises `InputError`.
 
-    What counts is the content: an `.xlsx` that is named `.xls` is read too.
+    With `empty`, rows without a value that lie above others are there too, of no cells. What counts is the content: an
+    `.xlsx` that is named `.xls` is read too.
     """
     check_library("openpyxl", "xlsx", path)
-    return apart(_rows, path, what="Excel", modules=("openpyxl",))
+    sheets = apart(_rows, path, what="Excel", modules=("openpyxl",))
+    return sheets if empty else {sheet: [row for row in rows if row] for sheet, rows in sheets.items()}
 
 
 def write_workbook(sheets: Mapping[str, Sequence[Row]], path: Path, *, named: Path) -> None:
@@ -66,18 +80,57 @@ def _rows(path: Path) -> dict[str, list[Row]]:
                 claimed.claim(IN_CELLS * info.file_size, info.filename)
         file.seek(0)
         book = openpyxl.load_workbook(file, read_only=True, data_only=True)
-        return {sheet.title: list(_filled(sheet, claimed)) for sheet in book.worksheets}
+        found = {sheet.title: list(_filled(sheet, claimed)) for sheet in book.worksheets}
+        if not any(
+            isinstance(value, dt.date | dt.time | dt.timedelta) for r in found.values() for x in r for value in x
+        ):
+            return found
+        zero = FROM_1970[1904 if book.epoch.year == 1904 else 1900]
+        kept = {name: getattr(book, name) for name in _FORMATS}
+        for name in _FORMATS:  # else the library rounds what is a date to a millisecond
+            setattr(book, name, type(kept[name])())
+        plain = {sheet.title: list(_filled(sheet, claimed)) for sheet in book.worksheets}
+        return {
+            sheet: [tuple(map(_moment, row, plain[sheet][i], repeat(zero))) for i, row in enumerate(rows)]
+            for sheet, rows in found.items()
+        }
+
+
+_FORMATS = ("_date_formats", "_timedelta_formats")
+
+
+def _moment(value: Any, plain: Any, zero: float) -> Any:
+    """A cell as it is, or the moment that it holds; `plain` is its number."""
+    if not isinstance(value, dt.date | dt.time | dt.timedelta):
+        return value
+    number = float(plain) if isinstance(plain, int | float) else None
+    if isinstance(value, dt.timedelta):
+        return Moment(kind="time", days=value / dt.timedelta(days=1) if number is None else number)
+    if isinstance(value, dt.time):
+        apart = dt.timedelta(
+            hours=value.hour, minutes=value.minute, seconds=value.second, microseconds=value.microsecond
+        )
+        return Moment(kind="time of day", days=apart / dt.timedelta(days=1) if number is None else number)
+    if number is not None:
+        return Moment(kind="date", days=number - zero)
+    at = value if isinstance(value, dt.datetime) else dt.datetime(value.year, value.month, value.day)
+    return Moment(kind="date", days=(at.replace(tzinfo=dt.UTC) - dt.datetime(1970, 1, 1, tzinfo=dt.UTC)) / _ONE_DAY)
+
+
+_ONE_DAY = dt.timedelta(days=1)
 
 
 def _filled(sheet: Any, claimed: Budget) -> Iterator[Row]:
-    """Rows with a value in them; a row is as wide as its last cell says, however few it has. Raises `InputError`."""
-    empty = 0
+    """Rows to the last with a value in it, those without one as none; a row is as wide as its last cell says.
+
+    Raises `InputError`.
+    """
+    empty = 0  # programs write 65536 of them at the end
     for row in sheet.iter_rows(values_only=True):
         claimed.claim(PLACE * len(row), f"sheet {sheet.title}")
         if all(value is None for value in row):
             empty += 1
-            if empty > MOST_EMPTY:
-                return
             continue
+        yield from repeat((), empty)
         empty = 0
         yield row

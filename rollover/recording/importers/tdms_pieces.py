@@ -1,0 +1,80 @@
+"""Pieces of a TDMS file: a logger appends to it, and may say something else of a channel each time.
+
+The reader keeps the last word alone, of the start of a waveform too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+START = "wf_start_time"
+MATTERS = ("wf_increment", "wf_start_offset", "wf_xunit_string", "unit_string")
+SCALES = ("NI_Scale[", "NI_Number_Of_Scales", "NI_Scaling_Status")
+ON_TIME = 1.0  # step: a start that is written again lies as near to where the samples have come
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pieces:
+    """What changes within a file, by path of a channel, a group or the file."""
+
+    starts: Mapping[str, Sequence[tuple[int, Any]]] = field(default_factory=dict)  # sample, stamp from there on
+    changed: Mapping[str, str] = field(default_factory=dict)  # in words
+
+
+def pieces_of(nptdms: Any, path: Path) -> Pieces:
+    """Read what each piece of a file says anew."""
+    starts: dict[str, list[tuple[int, Any]]] = {}
+    changed: dict[str, str] = {}
+
+    class Reader(nptdms.reader.TdmsReader):  # type: ignore[misc]
+        counts: Mapping[str, int] = MappingProxyType({})  # values before the piece that is being read
+
+        def _update_object_metadata(self, segment: Any) -> None:
+            self.counts = {path: about.num_values for path, about in self.object_metadata.items()}
+            super()._update_object_metadata(segment)
+
+        def _update_object_properties(self, segment_object_properties: Any) -> None:
+            written = any(self.counts.values())
+            for name, properties in (segment_object_properties or {}).items():
+                known = self._get_or_create_object(name).properties
+                for key, value in properties:
+                    is_same = key in known and bool(known[key] == value)  # many writers repeat what holds still
+                    if key == START and not is_same:
+                        said, at = starts.setdefault(name, []), self.counts.get(name, 0)
+                        said[:] = [*(one for one in said if one[0] != at), (at, value)]
+                    is_new = written and self.counts.get(name, 1) > 0 and not is_same
+                    if is_new and (key in MATTERS or key.startswith(SCALES)):
+                        changed.setdefault(name, f"{key} changes within the file, got {known.get(key)} and {value}")
+            super()._update_object_properties(segment_object_properties)
+
+    reader = Reader(str(path))
+    try:
+        reader.read_metadata()
+    finally:
+        reader.close()
+    return Pieces(starts=starts, changed=changed)
+
+
+def continued(
+    time: NDArray[np.float64], step: float, starts: Sequence[tuple[int, int]]
+) -> tuple[NDArray[np.float64], str]:
+    """Stamps of samples that were written in pieces, each from its own start (sample, ns); what is to be said of them.
+
+    Raises ``ValueError`` where the pieces overlap.
+    """
+    own = time.copy()
+    for at, began in starts:
+        own[at:] = time[0] + (began - starts[0][1]) / 1e9 + step * np.arange(time.size - at)
+    leaps = np.array([own[at] - time[at] for at, _ in starts])
+    if np.all(np.abs(leaps) <= ON_TIME * step):
+        return time, ""
+    if np.any(np.diff(own) <= 0.0):
+        raise ValueError(f"its {len(starts)} pieces overlap in time by their {START}; pieces one after the other")
+    return own, f"{len(starts)} pieces by their {START}, at {', '.join(f'{own[at]:g}' for at, _ in starts[:6])} s"
