@@ -16,7 +16,7 @@ from rollover.diagnosis.inference.residual_law import fitted_law
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import Explanation, kind_of
-from rollover.diagnosis.selection.forward_step import confusion, ends_at_bound, step
+from rollover.diagnosis.selection.forward_step import by_chance, confusion, ends_at_bound, step
 from rollover.diagnosis.selection.scan import look
 from rollover.diagnosis.selection.stepwise import with_conditions_refitted
 from rollover.diagnosis.settings import SETTINGS
@@ -42,6 +42,10 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
     first, left = with_conditions_refitted(
         problem, first, mismatch_of(problem.dataset, first.fitted.blocks, phases), phases
     )
+    shared = problem.samples_per_error
+    if shared > 1.0:
+        # a rig repeats its discrepancy: it is one draw for all recordings, however many there are, (D20)
+        first = replace(first, p_value=by_chance(first.base, first.rivals, looked, shared * len(problem.dataset)))
     first = first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map)
     leader = best_predictor(problem, first, groups)
     if leader is not first.fitted:
