@@ -44,7 +44,7 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
     )
     shared = problem.samples_per_error
     if shared > 1.0:
-        # a rig repeats its discrepancy: it is one draw for all recordings, however many there are, (D20)
+        # a rig repeats its discrepancy: it is one draw for all recordings, however many there are, (D21)
         first = replace(first, p_value=by_chance(first.base, first.rivals, looked, shared * len(problem.dataset)))
     first = first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map)
     leader = best_predictor(problem, first, groups)
