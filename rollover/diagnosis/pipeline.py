@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rollover.diagnosis.alone import follows_a_law
+from rollover.diagnosis.alone import follows_a_law, repeats_its_course
 from rollover.diagnosis.conclusion import Asked, Conclusion, concluded
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import Aside, find_inconsistencies, without_inconsistent
@@ -165,10 +165,12 @@ def _beside_estimated_discrepancy(
 
 
 def _is_lawful(found: Conclusion) -> bool:
-    """Whether what nothing explains follows a law that carries over to recordings that were held out."""
+    """Whether what nothing explains carries over to recordings that were held out, by its course or by a law."""
     problem, scenario = found.problem, found.asked.scenario
     if scenario is None:
         return False
+    if repeats_its_course(problem, found.explanation.base, found.groups):
+        return True
     scenarios = [set_up(scenario, e.recording) for e in problem.dataset]
     return follows_a_law(problem, found.explanation.base, scenarios, found.groups)
 

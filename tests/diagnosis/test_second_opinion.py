@@ -80,7 +80,7 @@ def test_beside_a_background_a_foreign_form_is_a_likeness(opinions: dict[Estimat
     assert found.discrepancy[FORCE].scale > 0.0
 
 
-def test_a_background_that_an_effect_resembles_is_given_no_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_background_that_an_effect_resembles_has_no_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An added mass predicts 0.56 (0.28 at least) of it, drop for drop: of a background that all drops repeat."""
     write_case(make(Order(index=2, seed=20270402, kind="background", ids=(), background=0.03)), tmp_path / "case")
     chosen, recordings = load(tmp_path / "case" / "scenario.yaml"), recordings_in(tmp_path / "case")
