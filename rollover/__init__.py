@@ -283,7 +283,7 @@ def diagnose(
     hold_out: str | Sequence[str] = (),
     tolerance: float | Mapping[str, float] = 0.0,
     reference: str | Sequence[str] = (),
-    estimate: bool | Literal["unexplained"] = False,
+    estimate: bool | Literal["unexplained"] = "unexplained",
     profile: str | Path | None = None,
     workers: int = 0,
 ) -> Diagnosis:
@@ -300,8 +300,9 @@ def diagnose(
     reference
         Names of recordings of the same rig in which nothing is suspected: they teach that share.
     estimate
-        Estimate that share where nothing explains the recordings beside their noise, and diagnose again beside it;
-        "unexplained": only in place of that verdict, where no share is stated. What noise explains stays as it is.
+        Estimate that share where nothing explains the recordings beside their noise, and diagnose again beside it: in
+        place of "unexplained" alone, where no share is stated; True: whatever is stated, and what that makes doubtful
+        is not named either; False: never.
     workers
         Child processes that fit at once; the answer is the same.
 

@@ -9,14 +9,15 @@ from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import with_time_shift_search
 from rollover.diagnosis.fit.step import Groups, Step
-from rollover.diagnosis.grades import share_beyond, share_of, shares
+from rollover.diagnosis.grades import jackknifed, share_beyond, share_of, shares
 from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.inference.repeated_course import predicted_by_others, quick_channels
 from rollover.diagnosis.inference.residual_law import fitted_law
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import Explanation, kind_of
-from rollover.diagnosis.selection.forward_step import confusion, ends_at_bound, step
+from rollover.diagnosis.selection.forward_step import by_chance, confusion, ends_at_bound, step
 from rollover.diagnosis.selection.scan import look
 from rollover.diagnosis.selection.stepwise import with_conditions_refitted
 from rollover.diagnosis.settings import SETTINGS
@@ -42,6 +43,10 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
     first, left = with_conditions_refitted(
         problem, first, mismatch_of(problem.dataset, first.fitted.blocks, phases), phases
     )
+    shared = problem.samples_per_error
+    if shared > 1.0:
+        # a rig repeats its discrepancy: it is one draw for all recordings, however many there are, (D21)
+        first = replace(first, p_value=by_chance(first.base, first.rivals, looked, shared * len(problem.dataset)))
     first = first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map)
     leader = best_predictor(problem, first, groups)
     if leader is not first.fitted:
@@ -127,3 +132,14 @@ def follows_a_law(problem: Problem, base: Fitted, scenarios: Sequence[Scenario],
     fitted = fitted_law(problem, base, scenarios, problem.dataset, groups)
     share = None if fitted is None else share_of(problem, base, fitted, groups)
     return share is not None and share.low >= TUNING.half_share
+
+
+def repeats_its_course(problem: Problem, base: Fitted, groups: Groups) -> bool:
+    """Whether other conditions' mean course surely predicts half of what a base misses, and quicker than a background.
+
+    That is what an effect is asked for: a ringing is the same in all drops. Where a background is smooth and alike in
+    all drops nothing tells it from an effect of its size that no table holds.
+    """
+    quick = quick_channels(problem, base)
+    gained, due = predicted_by_others(problem, base, groups, quick)
+    return bool(due.sum() > 0.0) and jackknifed(gained, due, groups).low >= TUNING.half_share

@@ -33,7 +33,7 @@ def diagnosed(
         within("tolerance", share, 0.0, 0.5)
     is_file = isinstance(scenario, (str, Path)) and Path(scenario).suffix == ".py"
     if is_file or not isinstance(scenario, (str, Path, Scenario)):
-        if reference or estimate or not isinstance(tolerance, (int, float)):
+        if reference or estimate is True or not isinstance(tolerance, (int, float)):
             message = (
                 "not of a model of one's own; one tolerance for all channels is allowed, no reference, no estimate"
             )

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rollover.diagnosis.alone import follows_a_law
+from rollover.diagnosis.alone import follows_a_law, repeats_its_course
 from rollover.diagnosis.conclusion import Asked, Conclusion, concluded
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import Aside, find_inconsistencies, without_inconsistent
@@ -39,7 +39,7 @@ def diagnose(
     hold_out: Sequence[str] = (),
     tolerance: float | Mapping[str, float] = 0.0,
     reference: Sequence[str] = (),
-    estimate: Estimate = False,
+    estimate: Estimate = "unexplained",
     say: Callable[[str], None] = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:
@@ -161,16 +161,18 @@ def _beside_estimated_discrepancy(
     if isinstance(other, Diagnosis):
         return None
     is_told = bool(other.effects) or (
-        other.verdict == "no-mismatch" and learned.is_usual and not _has_residual_law(other)
+        other.verdict == "no-mismatch" and learned.is_usual and not _is_reproduced(other)
     )
     return reported(other) if is_told else None
 
 
-def _has_residual_law(found: Conclusion) -> bool:
-    """Whether what nothing explains follows a law that carries over to recordings that were held out."""
+def _is_reproduced(found: Conclusion) -> bool:
+    """Whether what nothing explains carries over to recordings that were held out, by its course or by a law."""
     problem, scenario = found.problem, found.asked.scenario
     if scenario is None:
         return False
+    if repeats_its_course(problem, found.explanation.base, found.groups):
+        return True
     scenarios = [set_up(scenario, e.recording) for e in problem.dataset]
     return follows_a_law(problem, found.explanation.base, scenarios, found.groups)
 

@@ -52,7 +52,7 @@ def diagnosed(
     hold_out: Sequence[str] = (),
     tolerance: float | Mapping[str, float] = 0.0,
     reference: Sequence[str] = (),
-    estimate: Estimate = False,
+    estimate: Estimate = "unexplained",
     say: Callable[[str], None] = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:

@@ -16,6 +16,8 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.result import Share
 from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.selection.forward_step import by_chance
+from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.statements import usual_model_error_sentence
 from rollover.effects import EFFECTS, Search
 
@@ -93,6 +95,17 @@ def test_an_effect_is_named_where_it_predicts_half_else_forgiven(
     )
     assert said == verdict
     assert bool(found.parts) == (verdict == "missing-physics")
+
+
+def test_a_gain_is_one_draw_however_many_recordings_repeat_it() -> None:
+    """Of errors that come anew 240 samples of six drops tell 24, of those that a rig repeats 4."""
+    base, best = nothing((2.0,) * DROPS), fitted("soil-layer", (1.0,) * DROPS)
+    rng = np.random.default_rng(1)
+    looked = ScoreTest(score=0.0, scores={}, null=np.sort(rng.chisquare(1, (2000, 20)).max(axis=1)), detectable={})
+    anew, repeated = (by_chance(base, [best], looked, shared) for shared in (10.0, 10.0 * DROPS))
+    assert anew < 1e-3
+    assert repeated > 0.3
+    assert by_chance(base, [fitted("soil-layer", (1.9,) * DROPS)], looked, 10.0) > anew
 
 
 @pytest.mark.parametrize(

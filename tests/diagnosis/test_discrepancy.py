@@ -9,10 +9,12 @@ import pytest
 from scipy.stats import norm
 
 from rollover.diagnosis import account, diagnose
-from rollover.diagnosis.data.dataset import Dataset, dataset_of
+from rollover.diagnosis.alone import repeats_its_course
+from rollover.diagnosis.data.dataset import Dataset, dataset_of, left_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.forward_model import simulator_of
+from rollover.diagnosis.grades import jackknifed
 from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.discrepancy import (
     MEDIAN,
@@ -26,6 +28,7 @@ from rollover.diagnosis.inference.discrepancy import (
     with_discrepancy,
 )
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.inference.repeated_course import predicted_by_others, quick_channels
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
@@ -114,6 +117,32 @@ def test_an_error_of_half_a_wave_is_one_for_as_long() -> None:
     times = correlation_times(problem, base)
     # a sine of 0.23 s has lost half its correlation after a sixth of that, and an exponential of the same after t ln 2
     assert times[DEPTH] == pytest.approx(0.23 / 6.0 / np.log(2.0), rel=0.35)
+
+
+@pytest.mark.parametrize(("turn", "repeats"), [(0.0, True), (2.0, False)])
+def test_a_ringing_alike_in_all_drops_is_no_background(turn: float, repeats: bool) -> None:
+    """At 45 Hz for 0.1 s; and where each drop begins at another phase of it."""
+    rung = []
+    for k, (name, r) in enumerate(recorded({}, 3, speeds=(1.5, 2.0, 2.5, 3.0), noise=0.003)):
+        after = np.maximum(r.time, 0.0)
+        wave = np.sin(2.0 * np.pi * 45.0 * after + turn * k) * np.exp(-after / 0.1) * (r.time > 0.0)
+        rung.append((name, replace(r, channels={c: v + 0.05 * np.ptp(v) * wave for c, v in r.channels.items()})))
+    problem = judged(rung)
+    base = problem.fit((), ())
+    assert base is not None
+    assert quick_channels(problem, base) == {FORCE, DEPTH}
+    assert repeats_its_course(problem, base, left_out(problem.dataset)) is repeats
+
+
+def test_a_slow_wave_alike_in_all_drops_may_be_a_background() -> None:
+    problem = judged(bent(0.02))
+    base = problem.fit((), ())
+    assert base is not None
+    assert quick_channels(problem, base) == set()
+    groups = left_out(problem.dataset)
+    gained, due = predicted_by_others(problem, base, groups, (FORCE, DEPTH))
+    assert jackknifed(gained, due, groups).share > 0.8  # though it is the same in all
+    assert not repeats_its_course(problem, base, groups)
 
 
 def test_references_teach_the_scale_unless_noise_hides_it() -> None:

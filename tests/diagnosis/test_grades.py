@@ -46,6 +46,14 @@ def test_a_share_is_of_all_recordings_its_interval_jackknifed() -> None:
         found = jackknifed(due * rng.normal(0.7, 0.1, 6), due, [[k] for k in range(6)])
         covered += found.low <= 0.7 <= found.high
     assert 0.90 < covered / 300 < 0.99
+    # a channel that one drop alone drives to its end: of what the others leave nothing is told by it, nor against it
+    one = jackknifed(
+        np.array([80.0, 0.0, 0.2, -0.3, 0.0]), np.array([100.0, 1.0, 0.8, 1.2, 1.0]), [[k] for k in range(5)]
+    )
+    assert one.share == pytest.approx(79.9 / 104.0)
+    assert one.low > 0.6
+    some = jackknifed(np.array([80.0, 0.0, 0.0, 0.0]), np.array([100.0, 40.0, 50.0, 30.0]), [[k] for k in range(4)])
+    assert some.low < 0.0  # of large parts that it predicts nothing of
     alone = jackknifed(np.array([3.0]), np.array([4.0]), [[0]])
     assert (alone.share, alone.low) == (0.75, -np.inf)  # of one recording nothing is told
 

@@ -69,8 +69,10 @@ def test_a_wrong_known_clock_is_reported_with_its_cure(
 
 def test_a_diagnosis_reports_a_wrong_clock_and_frees_it() -> None:
     given = drops(Clock(), (0.03, 0.03, 0.03))
+    assert diagnose(scenario(), given, estimate=False).verdict == "unexplained"
     kept = diagnose(scenario(), given)
-    assert kept.verdict == "unexplained"
+    assert (kept.verdict, {e.id for e in kept.effects}) == ("sensor", {"sensor-clock-offset"})
+    assert kept.broken == ()
     assert sum("left as it is stated to be" in note for note in kept.notes) == 3
     unknown = diagnose(scenario(), [(name, replace(r, clock=Clock(zero="unknown"))) for name, r in given])
     assert unknown.verdict == "no-mismatch"

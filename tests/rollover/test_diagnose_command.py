@@ -247,6 +247,7 @@ def test_wrong_input_is_one_line_and_nothing_is_written(
         (("--reference", "v1", "--hold-out", "v1"), "--reference: held out too, got 'v1'"),
         (("--reference", "v1", "--tolerance", "0.05"), "--reference: beside --tolerance, got both"),
         (("--second-opinion", "--estimate"), "--second-opinion: beside --estimate, got both; one of them says it"),
+        (("--no-estimate", "--second-opinion"), "--second-opinion: beside --no-estimate, got both"),
         (("--reference", "v1", "--reference", "v2", "--hold-out", "v3"), "--reference: nothing left to fit"),
     ],
 )
@@ -261,7 +262,13 @@ def test_what_is_no_share_no_channel_or_no_recording_is_one_line(
 
 @pytest.mark.parametrize(
     ("words", "asked"),
-    [((), False), (("--estimate",), True), (("--second-opinion",), "unexplained"), (("--no-estimate",), False)],
+    [
+        ((), "unexplained"),
+        (("--second-opinion",), "unexplained"),
+        (("--estimate",), True),
+        (("--no-estimate",), False),
+        (("--no-second-opinion",), False),
+    ],
 )
 def test_an_estimate_is_made_as_it_is_asked_for(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], asked: Estimate

@@ -80,20 +80,22 @@ def diagnose(
         ),
     ] = None,
     estimate: Annotated[
-        bool,
+        bool | None,
         typer.Option(
             "--estimate/--no-estimate",
             help="Where nothing explains the recordings beside their noise, estimate how far the model misses by "
-            "itself, and diagnose again beside that.",
+            "itself, and diagnose again beside that: whatever is stated, or never.",
+            show_default="in place of `unexplained` alone, where no share is stated",
         ),
-    ] = False,
+    ] = None,
     second_opinion: Annotated[
-        bool,
+        bool | None,
         typer.Option(
-            "--second-opinion",
-            help="Do so only in place of `unexplained`, and where no share is stated: all other answers stay.",
+            "--second-opinion/--no-second-opinion",
+            help="Whether to do so in place of `unexplained`; all other answers stay.",
+            show_default="it is done",
         ),
-    ] = False,
+    ] = None,
     set_: Setting = None,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
@@ -155,9 +157,10 @@ def diagnose(
     allowed = tolerances(tolerance or [], measured)
     if taught and allowed:
         raise InputError(Fault(file="--reference", message="beside --tolerance, got both; one of them says it"))
-    if estimate and second_opinion:
-        raise InputError(Fault(file="--second-opinion", message="beside --estimate, got both; one of them says it"))
-    how: Estimate = True if estimate else "unexplained" if second_opinion else False
+    if (estimate and second_opinion is not None) or (estimate is False and second_opinion):
+        said = "--estimate" if estimate else "--no-estimate"
+        raise InputError(Fault(file="--second-opinion", message=f"beside {said}, got both; one of them says it"))
+    how: Estimate = True if estimate else False if False in (estimate, second_opinion) else "unexplained"
     folder = out or Path("out", "diagnose", path.stem)
     about: dict[str, Any] = {
         "scenario_hash": document.content_hash(chosen),
@@ -176,7 +179,7 @@ def diagnose(
     notebook = notes(folder)
     about_fits = json.dumps([about, results.versions()], sort_keys=True)
     words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, tolerance, reference, set_, profile)]
-    words += ["--estimate"] * estimate + ["--second-opinion"] * second_opinion
+    words += [] if how == "unexplained" else ["--estimate" if how else "--no-estimate"]
     with Executor(workers, notebook, about_fits) as executor:
         found = diagnosed(
             chosen,

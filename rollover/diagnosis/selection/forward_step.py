@@ -93,14 +93,20 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
         fits = _refitted_where_slopes_mislead(inquiry, fits)
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     fits = simplest(fits, groups, problem.samples_per_error)
-    least = min(f.left for f in fits)
-    dispersion = max(1.0, least / count)  # what even the best leaves is no chance of the noise's size
-    score = looked.score
-    if problem.samples_per_error > 1.0:
-        # beside a tolerance what is missing is large, and a fit finds more of it than its slope where it is not
-        dispersion, score = dispersion * problem.samples_per_error, max(score, base.left - least)
-    p = p_value(score / dispersion, looked.null)
+    p = by_chance(base, fits, looked, problem.samples_per_error)
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
+
+
+def by_chance(base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shared: float) -> float:
+    """p-value of what the best of all fits gains, where `shared` samples have one error."""
+    least = min(f.left for f in fits)
+    # what even the best leaves is no chance of the noise's size
+    dispersion = max(1.0, least / sum(b.residual.size for b in base.blocks))
+    score = looked.score
+    if shared > 1.0:
+        # beside a tolerance what is missing is large, and a fit finds more of it than its slope where it is not
+        dispersion, score = dispersion * shared, max(score, base.left - least)
+    return p_value(score / dispersion, looked.null)
 
 
 def reusable_slopes(problem: Problem, base: Fitted, few: Sequence[int] | None = None) -> tuple[Array, ...] | None:

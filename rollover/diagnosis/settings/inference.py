@@ -47,6 +47,9 @@ class Discrepancy:
     refit_below: float = 0.7  # ratio of two estimates: a smaller one is worth another fit; chosen
     usual_most: float = 0.05  # share of a channel's range: three quarters of all models miss less; from `usual_range`
     draws: float = 2.0  # independent draws in a channel of a drop; loading, and unloading with rest
+    # share of the way down: least correlation time of a discrepancy, as it keeps its sign over a good part of a phase
+    # (a wave of two turns on the way down: 1/(2*6 ln 2) = 0.12); what is quicker and repeats is none
+    shortest: float = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
