@@ -121,7 +121,7 @@ def test_effects_reach_feet_that_turn_and_mounts_beside_them() -> None:
 
 @pytest.mark.parametrize("effect", ["rops-elasticity.stiffness", "rops-plasticity.yield_force", "mount-play.gap"])
 def test_an_effect_at_its_null_leaves_feet_as_they_are(effect) -> None:
-    base = load("slope_overturn_tubes")
+    base = load("field_upset_tubes")
     null = base.replaced({f"effects.{effect}": 0.0 if effect.endswith("gap") else None})
     assert null.effects
     assert null.applied().vehicle == base.vehicle
