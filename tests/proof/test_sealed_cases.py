@@ -103,7 +103,7 @@ def test_the_same_seed_makes_the_same_cases_and_no_seed_others(cases: Path, tmp_
 
 
 def test_the_baseline_is_a_function(cases: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where nothing is missing it goes as far as what was measured; a candidate that is switched on changes that."""
+    """Where nothing is missing it is what was measured, but for clock and noise; a candidate changes it."""
     monkeypatch.syspath_prepend(str(cases))
     monkeypatch.delitem(sys.modules, "baseline", raising=False)
     import baseline  # type: ignore[import-not-found]
@@ -112,9 +112,13 @@ def test_the_baseline_is_a_function(cases: Path, monkeypatch: pytest.MonkeyPatch
     (null, *_) = [t["case"] for t in truths if t["kind"] == "null"]
     heard, plain = baseline.measured(null, "r1"), baseline.simulate(null, "r1")
     assert set(plain) == set(heard.channels)
-    for channel, values in plain.items():  # clocks and noise aside: where it ends up, and how far it went
-        own = heard[channel][np.isfinite(heard[channel])]
-        assert abs(np.ptp(own) - np.ptp(values)) < 0.1 * np.ptp(values), channel
+    for channel, values in plain.items():  # a clock is late by up to 20 ms, noise is up to 3 % of the range
+        fine = np.isfinite(heard[channel])
+        late = [
+            np.interp(heard.time[fine] - shift, heard.time, values) - heard[channel][fine]
+            for shift in np.linspace(-0.025, 0.025, 101)
+        ]
+        assert min(float(np.sqrt(np.mean(off**2))) for off in late) < 0.05 * np.ptp(values), channel
     other = baseline.simulate(null, "r1", {"effects.mass.added": 20.0})
     assert any(np.abs(other[c] - plain[c]).max() > 1e-3 * np.abs(plain[c]).max() for c in plain)
     with pytest.raises(ro.InputError, match="mass"):
