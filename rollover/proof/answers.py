@@ -102,10 +102,8 @@ def _faults(found: Answers, given: Sealed) -> Iterator[tuple[str, str]]:
             yield from _unknown(f"{at}.effects.{j}", name, given)
         for id in answer.probabilities or {}:
             if id not in given.candidates and id not in (NOTHING, NOT_LISTED):
-                yield (
-                    f"{at}.probabilities.{id}",
-                    f"no such candidate; {hint(id, [*given.candidates, NOTHING, NOT_LISTED])}",
-                )
+                known = hint(str(id), [*given.candidates, NOTHING, NOT_LISTED])
+                yield f"{at}.probabilities", f"no such candidate, got {id!r}; {known}"
     if missing := [case for case in given.cases if case not in seen]:
         shown = ", ".join(missing[:5]) + (f" and {len(missing) - 5} more" if len(missing) > 5 else "")
         yield "answers", f"not answered: {shown}; every case, with the verdict no-answer where there is none"
@@ -116,10 +114,10 @@ def _unknown(at: str, name: Name, given: Sealed) -> Iterator[tuple[str, str]]:
         if id not in given.candidates:
             yield at, f"no such candidate, got {id!r}; {hint(id, given.candidates)}"
             return
-    known = given.candidates[name.id].get("parameters", {})
+    own = given.candidates[name.id].get("parameters", {})
     for parameter in name.parameters:
-        if parameter not in known:
-            yield f"{at}.parameters", f"none of {name.id}, got {parameter!r}; {hint(parameter, known)}"
+        if parameter not in own:
+            yield f"{at}.parameters", f"none of {name.id}, got {parameter!r}; {hint(str(parameter), own)}"
 
 
 def scored(found: Answers, given: Sealed, truth: Path) -> dict[str, Any]:

@@ -14,12 +14,19 @@ from scipy.stats import kstest
 from typer.testing import CliRunner
 
 from rollover.cli.main import app
-from rollover.diagnosis import diagnose
+from rollover.diagnosis.data.dataset import dataset_of
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.forward.averaging import simulated
+from rollover.diagnosis.inference.posterior import drawn
+from rollover.effects import Search
 from rollover.recording.importers import write_recording
 from tests.diagnosis.drops import recorded, scenario
 
 pytest.importorskip("emcee", reason="draws need the extra `posterior`")
 
+RANGE = Search(200.0, 450.0, "log")
 DAMPED = {"effects.soil-viscous-damping.damping": 300.0, "effects.soil-viscous-damping.exponent": 1.0}
 
 
@@ -54,8 +61,8 @@ def test_draws_of_what_is_named_lie_where_its_interval_does(folder: Path, tmp_pa
     width = one["high"] - one["low"]
     assert each["mean"] == pytest.approx(float(draws[:, k].mean()), rel=1e-6)
     assert abs(each["median"] - one["value"]) < 0.25 * width
-    # the interval has a gain error of the model beside what the draws have
-    assert 0.5 * width < each["high"] - each["low"] < 1.1 * width
+    # the interval has a gain error of the model in each channel beside what the draws have
+    assert 0.25 * width < each["high"] - each["low"] < width
     assert each["low"] < 300.0 < each["high"]
     assert each["r_hat"] < 1.1
     text = (out / "report.html").read_text()
@@ -69,18 +76,25 @@ def test_draws_of_what_is_named_lie_where_its_interval_does(folder: Path, tmp_pa
     assert {k: v for k, v in again.items() if k not in drop} == {k: v for k, v in answer.items() if k not in drop}
 
 
-def test_draws_hold_the_truth_as_often_as_they_say() -> None:
-    """Ranks of the damping among draws, over campaigns of other noise and other damping: uniform."""
+def test_ranks_of_the_truth_among_the_draws_are_uniform() -> None:
+    """Simulation-based calibration: damping and clocks from their priors, drops from these, draws from the drops.
+
+    Twenty drawn as widely as a campaign leaves open would stray from uniform by half of that here and there; draws half
+    as wide as they should be, or off by one deviation, are seen (tested by hand).
+    """
+    candidate = Candidate(id="soil-viscous-damping", kind="physics", family="", search={"damping": RANGE})
     rng, ranks = np.random.default_rng(5), []
-    for k in range(24):
-        true = float(300.0 * np.exp(rng.uniform(-0.5, 0.5)))
-        changes = {**DAMPED, "effects.soil-viscous-damping.damping": true}
-        found = diagnose(scenario(), recorded(changes, seed=k, speeds=(2.0, 3.5)), posterior=500)
-        if found.posterior is None or found.effects[0].id != "soil-viscous-damping":
-            continue
-        column = list(found.posterior.names).index("soil-viscous-damping.damping")
-        ranks.append(float(np.mean(found.posterior.values[:, column] < true)))
-    assert len(ranks) >= 18
+    for k in range(20):
+        true = float(RANGE.low * (RANGE.high / RANGE.low) ** rng.uniform())
+        changes = {"effects.soil-viscous-damping.damping": true}
+        every = recorded(changes, seed=k, speeds=(2.0, 3.5), noise=0.03, rate=200.0)
+        found = [dataset_of(name, *simulated(scenario(), r)) for name, r in every]
+        problem = Problem([e for e in found if e is not None])
+        align(problem)
+        fitted = problem.fit((candidate,), (0.5,))
+        assert fitted is not None
+        values = drawn(problem, fitted, 500, seed=k).values
+        ranks.append(float(np.mean(values[:, 0] < true)))
     assert kstest(ranks, "uniform").pvalue > 0.05, sorted(ranks)
 
 
