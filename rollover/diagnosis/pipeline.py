@@ -26,6 +26,7 @@ from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis, Estimate
 from rollover.diagnosis.selection.decision import Explanation
+from rollover.dynamics.drop_test import unfit
 from rollover.recording import Recording
 from rollover.recording.attitude import continuous
 from rollover.scenario import Scenario
@@ -74,7 +75,7 @@ def diagnose(
         if channel not in channels:
             raise ValueError(f"tolerance: no such channel recorded, got {channel!r}; {', '.join(channels)}")
     executor = executor or Executor()
-    if posterior and not isinstance(scenario.vehicle, Striker):
+    if posterior and unfit(scenario):
         raise ValueError("posterior: of drops only, got an overturn; 0 draws, or those of a calibration")
     recordings, zeros = with_clock_zeros(scenario, [(name, continuous(r)) for name, r in recordings])
     is_drop = isinstance(scenario.vehicle, Striker)  # what little errors do to an overturn is chance, see `chaos`

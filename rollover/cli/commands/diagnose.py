@@ -143,8 +143,8 @@ def diagnose(
     from rollover.diagnosis.io import DRAWS, FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
     from rollover.diagnosis.overlay import series
     from rollover.diagnosis.sensors_first import check, diagnosed, plain, sensor_precheck
+    from rollover.dynamics.drop_test import unfit
     from rollover.spec import document
-    from rollover.spec.vehicle import Striker
     from rollover.system.writing import notes
 
     path = document.find(scenario)
@@ -162,7 +162,7 @@ def diagnose(
         raise InputError(Fault(file="--second-opinion", message="beside --estimate, got both; one of them says it"))
     if posterior:
         installed()
-        if not isinstance(chosen.vehicle, Striker):
+        if unfit(chosen):
             message = "of drops only, got an overturn, whose draws are runs; without it, or calibrate --posterior"
             raise InputError(Fault(file="--posterior", message=message))
     how: Estimate = True if estimate else "unexplained" if second_opinion else False

@@ -10,6 +10,7 @@ from pathlib import Path
 from rollover.system.errors import Fault, InputError
 
 LARGEST = 2**31  # of a seed that is drawn, so that it can be typed
+PRIVATE = 0o600  # of the truth: for its owner
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +33,7 @@ def write_sealed_cases(order: Order, folder: Path, truth: Path, *, force: bool, 
     from rollover.cli.templates import of_sealed_cases
     from rollover.proof import sealed_cases
     from rollover.proof.commitment import SEAL, write_truth
-    from rollover.system.writing import check_free, hold
+    from rollover.system.writing import check_free, hold, staged
 
     names = [sealed_cases.LIST, sealed_cases.CANDIDATES, SEAL, *of_sealed_cases(0, "", "")]
     if truth.resolve().is_relative_to(folder.resolve()):
@@ -68,7 +69,10 @@ def write_sealed_cases(order: Order, folder: Path, truth: Path, *, force: bool, 
         for name, text in of_sealed_cases(order.cases, order.rig, made.seal.digest).items():
             (part / name).write_text(text, encoding="utf-8")
         del asked["workers"]
-        write_truth(made.truths, made.seal, truth.parent, truth.name, asked)
+        truth.parent.mkdir(parents=True, exist_ok=True)
+        kept = staged(truth, lambda at: write_truth(made.truths, made.seal, at.parent, at.name, asked))
+    kept.replace(truth)
+    truth.chmod(PRIVATE)
     if as_json:
         print(json.dumps({**made.account, "seal": made.seal.public(), "truth": str(truth)}, indent=2))
     else:
