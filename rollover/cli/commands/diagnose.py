@@ -151,6 +151,11 @@ def diagnose(
     chosen = scenarios.load(path)
     if set_:
         chosen = chosen.replaced(settings(set_), origin="--set")
+    if posterior:
+        installed()
+        if unfit(chosen):
+            message = "of drops only, got an overturn, whose draws are runs; without it, or calibrate --posterior"
+            raise InputError(Fault(file="--posterior", message=message))
     measured = read(recordings, profile)
     check(chosen, measured)
     held = held_out(list(measured), hold_out or [], "--hold-out")
@@ -160,11 +165,6 @@ def diagnose(
         raise InputError(Fault(file="--reference", message="beside --tolerance, got both; one of them says it"))
     if estimate and second_opinion:
         raise InputError(Fault(file="--second-opinion", message="beside --estimate, got both; one of them says it"))
-    if posterior:
-        installed()
-        if unfit(chosen):
-            message = "of drops only, got an overturn, whose draws are runs; without it, or calibrate --posterior"
-            raise InputError(Fault(file="--posterior", message=message))
     how: Estimate = True if estimate else "unexplained" if second_opinion else False
     folder = out or Path("out", "diagnose", path.stem)
     about: dict[str, Any] = {

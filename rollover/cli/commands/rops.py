@@ -45,14 +45,14 @@ def rops_(
     segments: Annotated[int, typer.Option(help="Elements to a member.", min=2, max=200)] = 12,
     clamped: Annotated[bool, typer.Option("--clamped", help="Feet held still instead of on their mounts.")] = False,
     speed: Annotated[
-        float,
+        float | None,
         typer.Option(
             help="Of each load, m/s: what has a rate factor yields higher by it.",
             show_default="infinitely slow",
             min=1e-6,
             max=50.0,
         ),
-    ] = 0.0,
+    ] = None,
     set_: Setting = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/rops/NAME")] = None,
     force: Force = False,
@@ -75,7 +75,7 @@ def rops_(
     results.claim_account(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
     try:
         with told(file_of(name)), console.counting("loads") as show:
-            found = frame_test(chosen, segments=segments, clamped=clamped, speed=speed, progress=show)
+            found = frame_test(chosen, segments=segments, clamped=clamped, speed=speed or 0.0, progress=show)
     except ArithmeticError as e:
         console.say(f"{name}: {e}")
         raise typer.Exit(FAILED) from None
