@@ -111,7 +111,7 @@ class Law:
         flow = np.sign(over) * flow
         return trial - k * flow, slope, self.plastic + flow
 
-    def _in_time(self, at: Array, beyond: Array, h: float) -> tuple[Array, Array]:
+    def _in_time(self, at: NDArray[np.bool_], beyond: Array, h: float) -> tuple[Array, Array]:
         """How far flows what a trial leaves `beyond` its yield, and the slope of its force, where `at` holds.
 
         Implicit Euler: (k + H) dp + F_y (dp/(h D))^(1/q) = beyond.
