@@ -25,8 +25,8 @@ FORMAT = "rollover-rops/1"
 SHELF = "vehicles/rops"
 METHOD = (
     "Euler beams with fibre sections, elastic and then plastic with straight kinematic hardening; each load leans with "
-    "the frame. Joints are rigid and as strong as what they join; shear deflection, local buckling, tearing and the "
-    "rate of strain are left out."
+    "the frame. Joints are rigid and as strong as what they join; shear deflection, local buckling, tearing{more} are "
+    "left out."
 )
 
 
@@ -97,15 +97,23 @@ def account(found: FrameTest, about: Mapping[str, Any] | None = None) -> dict[st
         "frame_mass": sum(b.body.mass for b in found.rops.beams),
         "base": "clamped" if found.clamped or not found.rops.mounts else "mounts",
         "segments": found.segments,
+        **({"speed": found.speed} if found.speed else {}),
         "elements": len(found.frame.mesh.ends),
         "versions": versions(),
-        "method": METHOD,
+        "method": _method(found.speed),
         "members": [_member(b) for b in found.rops.beams],
         "tests": list(found.tests),
         "criteria": [asdict(row) for row in found.criteria],
         "verdict": _verdict(found),
         "warnings": warnings(found),
     }
+
+
+def _method(speed: float) -> str:
+    if speed == 0.0:
+        return METHOD.format(more=" and the rate of strain")
+    said = f" Loads go at {speed:g} m/s, and what has a rate factor yields higher by it (Cowper and Symonds)."
+    return METHOD.format(more="").replace("local buckling, tearing", "local buckling and tearing") + said
 
 
 def _member(b: Any) -> dict[str, Any]:
@@ -154,4 +162,12 @@ def warnings(found: FrameTest) -> list[str]:
         said.append(f"Members without a section carry nothing here: {', '.join(others)}.")
     if not found.clamped and any(any(m.play) or any(m.rotational_play_deg) for m in found.rops.mounts):
         said.append("The mounts' play is left out.")
+    stated = ("side_stiffness", "side_yield", "play")
+    names = [f.name for f in found.rops.feet if any(getattr(f, name) for name in stated)]
+    if names:
+        said.append(f"What is stated of feet is left out, sections and steel count: {', '.join(names)}.")
+    if effects := sorted(found.scenario.effects):
+        said.append(f"Effects of the scenario are left out: {', '.join(effects)}.")
+    if found.speed and (slow := sorted({b.material.name for b in found.rops.beams if b.material.rate_factor is None})):
+        said.append(f"Without a rate factor, and so without the rate of strain: {', '.join(slow)}.")
     return said

@@ -45,6 +45,7 @@ class FrameTest:
     frame: Frame
     clamped: bool
     segments: int
+    speed: float  # m/s of each load, 0 without the rate of strain
     tests: tuple[dict[str, Any], ...]
     criteria: tuple[Criterion, ...]
     last: State
@@ -55,18 +56,20 @@ def frame_test(
     *,
     segments: int = SEGMENTS,
     clamped: bool = False,
+    speed: float = 0.0,
     progress: Callable[[int, int], None] | None = None,
 ) -> FrameTest:
     """The static sequence of a scenario's vehicle on its ROPS alone; `progress(done, of)` is told.
 
-    `clamped` holds the feet still instead of on their mounts. Raises `InputError` for a ROPS without sections, in two
-    parts, or with a mount where there is no member.
+    `clamped` holds the feet still instead of on their mounts; at a `speed` (m/s) of the loads steels with a rate factor
+    yield higher. Raises `InputError` for a ROPS without sections, in two parts, with a mount where there is no member,
+    and for a speed where no rate factor is.
     """
     vehicle = scenario.vehicle
     rops = vehicle.rops if isinstance(vehicle, Vehicle) else None
     if rops is None or not isinstance(vehicle, Vehicle):
         raise InputError(Fault(path="vehicle.rops", message="none given, got a vehicle without one; a ROPS"))
-    _refuse(rops)
+    _refuse(rops, speed)
     test = scenario.initiation if isinstance(scenario.initiation, StaticTest) else StaticTest()
     try:
         loads = sequence(vehicle, test)
@@ -76,7 +79,7 @@ def frame_test(
         raise InputError(Fault(path=path, message=message)) from None
     state, tests = at_rest(frame), []
     for k, load in enumerate(loads):
-        entry, state = _loaded(frame, state, load, test, rops)
+        entry, state = _loaded(frame, state, load, test, rops, speed)
         tests.append(entry)
         if progress is not None:
             progress(k + 1, len(loads))
@@ -96,13 +99,14 @@ def frame_test(
         frame=frame,
         clamped=clamped,
         segments=segments,
+        speed=speed,
         tests=tuple(tests),
         criteria=tuple(rows),
         last=state,
     )
 
 
-def _refuse(rops: Rops) -> None:
+def _refuse(rops: Rops, speed: float) -> None:
     if not rops.beams:
         message = (
             "no member has a section, got tubes and boxes alone; members with `section` and `material`, as "
@@ -112,6 +116,11 @@ def _refuse(rops: Rops) -> None:
     if rops.upper is not None:
         message = "a frame in two parts is not calculated alone, got an upper part on hinges; null, or `rollover run`"
         raise InputError(Fault(path="vehicle.rops.upper", message=message))
+    if speed > 0.0 and not any(x.rate_factor for x in (*(b.material for b in rops.beams), *rops.mounts)):
+        names = ", ".join(sorted({b.material.name for b in rops.beams}))
+        cure = "`material: {base: S355, rate_factor: {rate: 3200, exponent: 5}}` for one that has"
+        message = f"no steel has a rate factor, got {names}; {cure}"
+        raise InputError(Fault(path="--speed", message=message))
 
 
 def _frame(rops: Rops, loads: Sequence[Push], segments: int, clamped: bool) -> Frame:
@@ -197,7 +206,9 @@ class _Goal:
         return False
 
 
-def _loaded(frame: Frame, state: State, load: Push, test: StaticTest, rops: Rops) -> tuple[dict[str, Any], State]:
+def _loaded(
+    frame: Frame, state: State, load: Push, test: StaticTest, rops: Rops, speed: float
+) -> tuple[dict[str, Any], State]:
     """What one load did, as a static test of `rollover run` says it, with where the frame yielded; the frame let go."""
     energy = load.energy is not None
     asked = load.asked.value if load.asked is not None else load.energy if energy else load.force
@@ -216,7 +227,7 @@ def _loaded(frame: Frame, state: State, load: Push, test: StaticTest, rops: Rops
     c = frame.pattern(_pressed(frame, load), DIRECTION[load.come_from])
     goal = _Goal(load)
     first = float(c @ state.u)
-    points, how = push(frame, state, c, step=STEP, most=test.most_deflection, goal=goal)
+    points, how = push(frame, state, c, step=STEP, most=test.most_deflection, goal=goal, speed=speed)
     if goal.failed or (goal.absorbed and load.until_failure):
         how = f"pushed on until it failed: {goal.failed or how.removeprefix('given up: ')}"
     last = points[-1]
@@ -233,7 +244,9 @@ def _loaded(frame: Frame, state: State, load: Push, test: StaticTest, rops: Rops
         **_intrusion(frame, points, rops),
     }
     try:
-        after = let_go(frame, last.state, c, last.force)
+        # back at the same speed, as far as a spring of the first stiffness would go
+        h = last.force / entry["stiffness"] / speed if speed > 0.0 else math.inf
+        after = let_go(frame, last.state, c, last.force, h)
         entry["permanent_set"] = float(c @ after.u) - first
     except ArithmeticError:
         after = last.state  # nothing stands any more to spring back

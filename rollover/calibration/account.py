@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from rollover.assessment.results import versions
+from rollover.calibration import posterior
 from rollover.calibration.calibrate import Calibration
 from rollover.calibration.posterior import Posterior
 from rollover.comparison.misfit import summary
@@ -44,36 +43,10 @@ def account(c: Calibration, about: Mapping[str, Any] | None = None) -> dict[str,
 
 def _posterior(c: Calibration, drawn: Posterior) -> dict[str, Any]:
     """Summary of the draws; the draws themselves are posterior.csv."""
-    values = c.draws
-    low, median, high = np.quantile(values, [0.025, 0.5, 0.975], axis=0)
-    each = {
-        p.path: {
-            "mean": values[:, k].mean(),
-            "deviation": values[:, k].std(ddof=1),
-            "low": low[k],
-            "median": median[k],
-            "high": high[k],
-            "r_hat": drawn.r_hat[k],
-            "autocorrelation_time": drawn.autocorrelation[k],
-            "effective_draws": drawn.effective[k],
-        }
-        for k, p in enumerate(c.parameters)
-    }
-    return {
-        "sampler": drawn.sampler,
-        "draws": len(values),
-        "walkers": drawn.walkers,
-        "steps": drawn.steps,
-        "warm_up_steps": drawn.warm_up,
-        "acceptance": drawn.acceptance,
-        "seed": drawn.seed,
-        "prior": "uniform between the bounds, of the logarithm where these are spaced logarithmically",
-        "parameters": each,
-        "correlation": np.corrcoef(values.T) if len(each) > 1 else [[1.0]],
-    }
+    prior = "uniform between the bounds, of the logarithm where these are spaced logarithmically"
+    return posterior.summary([p.path for p in c.parameters], c.draws, drawn, prior)
 
 
 def table(c: Calibration) -> str:
     """posterior.csv: a column for each value, SI, a row for each draw."""
-    rows = [",".join(p.path for p in c.parameters), *(",".join(f"{v:.9g}" for v in row) for row in c.draws)]
-    return "\n".join(rows) + "\n"
+    return posterior.table([p.path for p in c.parameters], c.draws)

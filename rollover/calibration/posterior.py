@@ -8,7 +8,7 @@ which they follow what is no ellipse.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,6 +62,42 @@ class Posterior:
             return []
         worst = float(np.max(self.r_hat))
         return [f"the walkers of the posterior do not agree, R-hat {worst:.3g}: more draws, or narrower bounds"]
+
+
+def summary(names: Sequence[str], values: Array, drawn: Posterior, prior: str) -> dict[str, Any]:
+    """Bare values that say what draws (n, p) of named values say, each with its convergence."""
+    low, median, high = np.quantile(values, [0.025, 0.5, 0.975], axis=0)
+    each = {
+        name: {
+            "mean": values[:, k].mean(),
+            "deviation": values[:, k].std(ddof=1),
+            "low": low[k],
+            "median": median[k],
+            "high": high[k],
+            "r_hat": drawn.r_hat[k],
+            "autocorrelation_time": drawn.autocorrelation[k],
+            "effective_draws": drawn.effective[k],
+        }
+        for k, name in enumerate(names)
+    }
+    return {
+        "sampler": drawn.sampler,
+        "draws": len(values),
+        "walkers": drawn.walkers,
+        "steps": drawn.steps,
+        "warm_up_steps": drawn.warm_up,
+        "acceptance": drawn.acceptance,
+        "seed": drawn.seed,
+        "prior": prior,
+        "parameters": each,
+        "correlation": np.corrcoef(values.T) if len(each) > 1 else [[1.0]],
+    }
+
+
+def table(names: Sequence[str], values: Array) -> str:
+    """posterior.csv: a column for each value, SI, a row for each draw."""
+    rows = [",".join(names), *(",".join(f"{v:.9g}" for v in row) for row in values)]
+    return "\n".join(rows) + "\n"
 
 
 def of_fit(objective: Objective, u: Array, found: Determination, *, draws: int = DRAWS, seed: int = 0) -> Posterior:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 from ground.quantity import quantities
 from rollover import scenario as scenarios
 from rollover.effects import effects as known_effects
+from rollover.effects import units_of
 from rollover.spec import channels as table
 from rollover.spec import document
 from rollover.spec.laws import laws as known_laws
@@ -72,6 +73,32 @@ def effects() -> list[Row]:
         {"id": name, "kind": effect.kind, "parameters": _numbers(effect), "is": _first_line(effect)}
         for name, effect in known.items()
     ]
+
+
+def candidates(kind: Literal["drop", "rollover"]) -> list[Row]:
+    """Effects that may be named as what a test of this kind misses, with all that is needed to try them."""
+    known: dict[str, Any] = dict(known_effects())
+    return [
+        {
+            "id": name,
+            "kind": effect.kind,
+            "is": _first_line(effect),
+            "equation": effect.equation,
+            "switched_on_by": f"effects.{name}.PARAMETER",
+            "needs_a_channel": effect.kind == "sensor",
+            "parameters": {
+                n: {"unit": units_of(effect)[n], "low": s.low, "high": s.high, "spaced": s.scale}
+                for n, s in _searched(effect).items()
+            },
+        }
+        for name, effect in known.items()
+        if effect.competes and kind in effect.acts
+    ]
+
+
+def _searched(effect: Any) -> dict[str, Any]:
+    """Ranges of an effect's numbers, those of its other forms among them."""
+    return {**{n: s for form in effect.forms for n, s in form.search.items()}, **effect.search}
 
 
 def _numbers(effect: Any) -> str:

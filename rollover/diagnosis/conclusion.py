@@ -68,6 +68,7 @@ class Asked:
     began: float
     discrepancy: Discrepancy | None = None
     estimates: bool = False  # whether a model error is estimated, and answers that it makes doubtful are refused
+    draws: int = 0  # of the numbers of what is named
     is_timed: bool = False  # whether clocks were set right that are off by far more than they may be
 
 

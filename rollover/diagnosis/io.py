@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from rollover.assessment.results import plain, versions
+from rollover.calibration import posterior
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.pipeline import diagnose
-from rollover.diagnosis.result import Diagnosis, Interval, Law, Named, Place, Score
+from rollover.diagnosis.result import Diagnosis, Draws, Interval, Law, Named, Place, Score
 from rollover.effects import nth
 from rollover.recording import Recording
 from rollover.recording.importers import read_named
@@ -20,7 +21,8 @@ from rollover.spec.document import dump
 
 FORMAT = "rollover-diagnosis/1"
 JSON, SCENARIO, PAGE, PICTURE = "diagnosis.json", "scenario-diagnosed.yaml", "report.html", "diagnosis.rrd"
-FILES = (JSON, SCENARIO, PAGE, PICTURE)
+DRAWS = "posterior.csv"
+FILES = (JSON, SCENARIO, PAGE, PICTURE, DRAWS)
 
 
 def account(
@@ -62,10 +64,16 @@ def account(
             "prechecks": list(prechecks),
             "clocks": {name: zero.answer for name, zero in found.clocks.items()},
             "notes": list(found.notes),
+            **({} if found.posterior is None else {"posterior": _posterior(found.posterior)}),
             "versions": versions(),
         }
     )
     return answer
+
+
+def _posterior(drawn: Draws) -> dict[str, Any]:
+    prior = "uniform over the range of the search, of the logarithm where that is looked for"
+    return posterior.summary(drawn.names, drawn.values, drawn.convergence, prior)
 
 
 def _place(place: Place) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis, Estimate
 from rollover.diagnosis.selection.decision import Explanation
+from rollover.dynamics.drop_test import unfit
 from rollover.recording import Recording
 from rollover.recording.attitude import continuous
 from rollover.scenario import Scenario
@@ -40,6 +41,7 @@ def diagnose(
     tolerance: float | Mapping[str, float] = 0.0,
     reference: Sequence[str] = (),
     estimate: Estimate = "unexplained",
+    posterior: int = 0,
     say: Callable[[str], None] = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:
@@ -52,6 +54,7 @@ def diagnose(
     nothing explains the recordings (see `inference.discrepancy`), and the answer beside it is given where it says more:
     if it is "unexplained" in place of that verdict alone, where neither of the others is stated; if it is True what
     the estimate makes doubtful is not named either.
+    `posterior` draws of the numbers of what is named are made, of drops only.
     `executor` works off the fits, in children if it has any; the answer is the same. Raises `InputError` for an
     unknown condition, a clock that nothing tells the zero of, and recordings without any channel that is simulated;
     ``ValueError`` for a name in `hold_out` or `reference` that is none, a tolerance outside 0 to 1.
@@ -72,6 +75,8 @@ def diagnose(
         if channel not in channels:
             raise ValueError(f"tolerance: no such channel recorded, got {channel!r}; {', '.join(channels)}")
     executor = executor or Executor()
+    if posterior and unfit(scenario):
+        raise ValueError("posterior: of drops only, got an overturn; 0 draws, or those of a calibration")
     recordings, zeros = with_clock_zeros(scenario, [(name, continuous(r)) for name, r in recordings])
     is_drop = isinstance(scenario.vehicle, Striker)  # what little errors do to an overturn is chance, see `chaos`
     recordings, rounded = with_rounding_uncertainty(recordings) if is_drop else (recordings, [])
@@ -86,6 +91,7 @@ def diagnose(
         executor=executor,
         began=began,
         estimates=estimate is True,
+        draws=posterior,
     )
     if reference:
         every, learned = _learned_from_references(scenario, every, reference)
@@ -160,9 +166,7 @@ def _beside_estimated_discrepancy(
             )
     if isinstance(other, Diagnosis):
         return None
-    is_told = bool(other.effects) or (
-        other.verdict == "no-mismatch" and learned.is_usual and not _is_reproduced(other)
-    )
+    is_told = bool(other.effects) or (other.verdict == "no-mismatch" and learned.is_usual and not _is_reproduced(other))
     return reported(other) if is_told else None
 
 

@@ -17,12 +17,13 @@ from rollover.diagnosis.grades import answer_of, share_of
 from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
 from rollover.diagnosis.inference.chassis import misfit_by_degree_of_freedom
 from rollover.diagnosis.inference.drop_dependence import Dependence, dependence, dependence_of_one
+from rollover.diagnosis.inference.posterior import drawn
 from rollover.diagnosis.inference.residual_law import offered, proposed
 from rollover.diagnosis.inference.scores import judged, misfit_before_impact
 from rollover.diagnosis.inference.vehicle_dependence import dependency
 from rollover.diagnosis.planning.by_fits import next_test
 from rollover.diagnosis.power import is_weak
-from rollover.diagnosis.result import Degree, Diagnosis, Named, Share
+from rollover.diagnosis.result import Degree, Diagnosis, Draws, Named, Share
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     by_share,
@@ -148,7 +149,16 @@ def reported(c: Conclusion) -> Diagnosis:
         ),
         discrepancy=told_of,
         by_itself=shown is not None,
+        posterior=_draws(c) if effects else None,
     )
+
+
+def _draws(c: Conclusion) -> Draws | None:
+    """Draws of what is named, where they were asked for; none of what recordings show by themselves."""
+    if not c.asked.draws or c.shown is not None or c.acts != "drop":
+        return None
+    c.asked.say("draws of what is left open of the numbers")
+    return drawn(c.problem, c.explanation.fitted, c.asked.draws)
 
 
 def _with_next_test(c: Conclusion) -> tuple[Named, ...]:

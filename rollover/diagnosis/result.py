@@ -6,6 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.calibration.posterior import Posterior
 from rollover.recording.time_stamps import Zero
 from rollover.system.notebook import card
 
@@ -162,6 +166,17 @@ class Law:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Draws:
+    """Draws (n, p) of what is fitted of the effects that are named, SI, with what was fitted and their convergence."""
+
+    names: tuple[str, ...]  # effect, its channel if it has one, parameter
+    units: tuple[str, ...]
+    values: NDArray[np.float64]
+    fitted: tuple[float, ...]
+    convergence: Posterior
+
+
+@dataclass(frozen=True, kw_only=True)
 class Diagnosis:
     """The whole answer."""
 
@@ -195,6 +210,7 @@ class Diagnosis:
     by_itself: bool = False  # whether the verdict is on what recordings show without any simulation
     checked: tuple[str, ...] = ()  # invariants that were checked
     broken: tuple[str, ...] = ()  # those of them that do not hold
+    posterior: Draws | None = None  # where it was asked for and something is named
     baseline: Mapping[str, Interval] = field(default_factory=dict)  # what a model of one's own is always fitted by
 
     def _repr_html_(self) -> str:

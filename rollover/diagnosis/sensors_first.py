@@ -53,6 +53,7 @@ def diagnosed(
     tolerance: float | Mapping[str, float] = 0.0,
     reference: Sequence[str] = (),
     estimate: Estimate = "unexplained",
+    posterior: int = 0,
     say: Callable[[str], None] = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:
@@ -64,6 +65,7 @@ def diagnosed(
         tolerance=tolerance,
         reference=reference,
         estimate=estimate,
+        posterior=posterior,
         say=say,
         executor=executor,
     )

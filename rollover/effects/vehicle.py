@@ -14,7 +14,7 @@ from rollover.spec.vehicle import Vehicle
 
 @parameters
 class RopsElasticity(Effect):
-    """Mounts of the ROPS with another stiffness: together k along y, the other directions in proportion."""
+    """Mounts or feet of the ROPS with another stiffness: together k along y, the other directions in proportion."""
 
     stiffness: Annotated[float | None, Quantity("N/m", "of all mounts together along y", above=0)] = 3e5
 
@@ -33,22 +33,25 @@ class RopsElasticity(Effect):
     search: ClassVar[Mapping[str, Search]] = {"stiffness": Search(3e4, 3e7, "log")}
 
     def changes(self, scenario: Any) -> Mapping[str, Any]:
-        """Stiffness and damping of every mount."""
+        """Stiffness and damping of every mount; of a foot its post's, whose damping follows."""
         rops = scenario.vehicle.rops if isinstance(scenario.vehicle, Vehicle) else None
-        if self.stiffness is None or rops is None or not rops.mounts:  # feet follow from sections
+        if self.stiffness is None or rops is None:
             return {}
-        ratio = self.stiffness / sum(mount.stiffness[1] for mount in rops.mounts)
+        own = rops.side_stiffness
+        ratio = self.stiffness / sum(own.values())
         found: dict[str, Any] = {}
         for mount in rops.mounts:
             at = f"vehicle.rops.mounts.{mount.name}"
             found[f"{at}.stiffness"] = tuple(ratio * k for k in mount.stiffness)
             found[f"{at}.damping"] = tuple(ratio**0.5 * k for k in mount.damping)
+        for foot in rops.feet:
+            found[f"vehicle.rops.feet.{foot.name}.side_stiffness"] = ratio * own[f"feet.{foot.name}"]
         return found
 
 
 @parameters
 class RopsPlasticity(Effect):
-    """Mounts of the ROPS that yield along y, all together at F_y, each by its share of the stiffness."""
+    """Mounts or feet of the ROPS that yield along y, together at F_y, each by its share of the stiffness."""
 
     yield_force: Annotated[float | None, Quantity("N", "F_y of all mounts together along y", above=0)] = 34_000.0
 
@@ -67,16 +70,20 @@ class RopsPlasticity(Effect):
     search: ClassVar[Mapping[str, Search]] = {"yield_force": Search(3e3, 3e5, "log")}
 
     def changes(self, scenario: Any) -> Mapping[str, Any]:
-        """The yield force along y of every mount."""
+        """The yield force along y of every mount, and of every foot to the side."""
         rops = scenario.vehicle.rops if isinstance(scenario.vehicle, Vehicle) else None
-        if self.yield_force is None or rops is None or not rops.mounts:  # feet follow from sections
+        if self.yield_force is None or rops is None:
             return {}
-        whole = sum(mount.stiffness[1] for mount in rops.mounts)
+        own = rops.side_stiffness
+        whole = sum(own.values())
         found: dict[str, Any] = {}
         for mount in rops.mounts:
             x, _, z = mount.yield_force
             part = self.yield_force * mount.stiffness[1] / whole
             found[f"vehicle.rops.mounts.{mount.name}.yield_force"] = (x, part, z)
+        for foot in rops.feet:
+            part = self.yield_force * own[f"feet.{foot.name}"] / whole
+            found[f"vehicle.rops.feet.{foot.name}.side_yield"] = part
         return found
 
 
@@ -195,7 +202,7 @@ class GyroscopicRotor(Effect):
 
 @parameters
 class MountPlay(Effect):
-    """Mounts of the ROPS with play: no force until the gap to either side is taken up."""
+    """Mounts or feet of the ROPS with play: no force until the gap to either side is taken up."""
 
     gap: Annotated[float, Quantity("m", "to either side along x, y, z", least=0)] = 0.008
 
@@ -214,10 +221,12 @@ class MountPlay(Effect):
     search: ClassVar[Mapping[str, Search]] = {"gap": Search(5e-4, 0.05, "log")}
 
     def changes(self, scenario: Any) -> Mapping[str, Any]:
-        """The play of every mount, beyond what it has."""
+        """The play of every mount and foot, beyond what it has."""
         rops = scenario.vehicle.rops if isinstance(scenario.vehicle, Vehicle) else None
-        mounts = () if rops is None or self.gap == 0.0 else rops.mounts
-        return {f"vehicle.rops.mounts.{mount.name}.play": tuple(p + self.gap for p in mount.play) for mount in mounts}
+        if rops is None or self.gap == 0.0:
+            return {}
+        mounts = {f"vehicle.rops.mounts.{m.name}.play": tuple(p + self.gap for p in m.play) for m in rops.mounts}
+        return mounts | {f"vehicle.rops.feet.{foot.name}.play": foot.play + self.gap for foot in rops.feet}
 
 
 @parameters

@@ -48,11 +48,17 @@ def digest(truths: Sequence[Mapping[str, Any]], salt: str) -> str:
     return hashlib.sha256(f"{salt}\n{text}".encode()).hexdigest()
 
 
-def write_truth(truths: Sequence[Mapping[str, Any]], seal: Seal, folder: Path) -> Path:
-    """Write truth.json, readable for its owner only; returns its path."""
+def write_truth(
+    truths: Sequence[Mapping[str, Any]],
+    seal: Seal,
+    folder: Path,
+    name: str = TRUTH,
+    asked: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write a truth, readable for its owner only, with what was `asked` for; returns its path."""
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / TRUTH
-    content = {"format": TRUTH_FORMAT, "salt": seal.salt, "truths": list(truths)}
+    path = folder / name
+    content = {"format": TRUTH_FORMAT, "salt": seal.salt, **({"asked": asked} if asked else {}), "truths": list(truths)}
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         json.dump(content, file, indent=1, allow_nan=False)

@@ -36,9 +36,8 @@ def scored(given: Any, truth: str) -> dict[str, Any] | None:
     """
     if given is None:
         return None
-    flaw = _flaw(given)
-    if flaw:
-        return {"flaw": flaw}
+    if what := flaw(given):
+        return {"flaw": what}
     p = {str(name): float(value) for name, value in given.items()}
     brier = sum((value - (name == truth)) ** 2 for name, value in p.items()) + (0.0 if truth in p else 1.0)
     return {
@@ -50,7 +49,8 @@ def scored(given: Any, truth: str) -> dict[str, Any] | None:
     }
 
 
-def _flaw(given: Any) -> str:
+def flaw(given: Any) -> str:
+    """Why these are no probabilities over names; nothing if they are."""
     if not isinstance(given, Mapping) or not given:
         return "no mapping of names"
     for name, value in given.items():

@@ -70,6 +70,41 @@ def diagnosed(handed: Handed) -> dict[str, Any]:
     return diagnose(handed.folder, handed.out, workers=1)
 
 
+def orders_of(
+    count: int,
+    seed: int,
+    *,
+    rig: str,
+    kinds: Sequence[str],
+    effects: Sequence[str],
+    background: float | str | None,
+) -> list[Order]:
+    """Which cases are to be made. Raises ``ValueError``."""
+    if rig not in RIGS:
+        raise ValueError(f"rig: no such rig, got {rig!r}; {', '.join(RIGS)} are allowed")
+    if background is not None and rig != "drop":
+        raise ValueError(f"background: of drops only, got it with the rig {rig!r}")
+    more = {} if background is None else {"background": background}
+    return list(importlib.import_module(RIGS[rig]).plan(count, seed, kinds, effects, **more))
+
+
+def made_cases(
+    orders: Sequence[Order], folders: Sequence[Path], *, rig: str, workers: int | None
+) -> list[dict[str, Any]]:
+    """Truths of cases whose folders are written, in their order. Raises ``ValueError`` where there is no room."""
+    truths: dict[int, dict[str, Any]] = {}
+    makings = [Making(order=o, folder=f, rig=rig) for o, f in zip(orders, folders, strict=True)]
+    for outcome in map_cases(made, makings, workers=workers):
+        if outcome.value is None:
+            sentence = outcome.failure.sentence if outcome.failure else "no reason given"
+            what = f"{orders[outcome.index].name} could not be made"
+            if (refused := _OF_FILES.match(sentence)) is not None:
+                raise ValueError(f"{what}: {refused[1]}; room for temporary files is needed")
+            raise RuntimeError(f"{what}: {sentence}")
+        truths[outcome.index] = outcome.value
+    return [truths[i] for i in range(len(orders))]
+
+
 def prove(
     count: int,
     seed: int,
@@ -91,25 +126,11 @@ def prove(
     Cases stand in a temporary folder, the truth in another one until it is opened. Raises ``ValueError`` for what
     cannot be planned or has no room for its files, and ``RuntimeError`` if a case cannot be made.
     """
-    if rig not in RIGS:
-        raise ValueError(f"rig: no such rig, got {rig!r}; {', '.join(RIGS)} are allowed")
-    if background is not None and rig != "drop":
-        raise ValueError(f"background: of drops only, got it with the rig {rig!r}")
     more = {} if background is None else {"background": background}
-    orders: list[Order] = importlib.import_module(RIGS[rig]).plan(count, seed, kinds, effects, **more)
+    orders = orders_of(count, seed, rig=rig, kinds=kinds, effects=effects, background=background)
     with scratch() as given, scratch() as kept:
         folders = [Path(given) / order.name for order in orders]
-        truths: dict[int, dict[str, Any]] = {}
-        makings = [Making(order=o, folder=f, rig=rig) for o, f in zip(orders, folders, strict=True)]
-        for outcome in map_cases(made, makings, workers=workers):
-            if outcome.value is None:
-                sentence = outcome.failure.sentence if outcome.failure else "no reason given"
-                what = f"{orders[outcome.index].name} could not be made"
-                if (refused := _OF_FILES.match(sentence)) is not None:
-                    raise ValueError(f"{what}: {refused[1]}; room for temporary files is needed")
-                raise RuntimeError(f"{what}: {sentence}")
-            truths[outcome.index] = outcome.value
-        ordered = [truths[i] for i in range(len(orders))]
+        ordered = made_cases(orders, folders, rig=rig, workers=workers)
         seal = sealed(ordered)
         path = write_truth(ordered, seal, Path(kept))
         on_seal(seal)

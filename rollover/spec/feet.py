@@ -2,7 +2,9 @@
 
 A direction in which rails tie the posts' tops sways as a portal: k = 12 E I/H^3 (1 + 6 r)/(4 + 6 r) for each post, with
 r = (I_rail/L)/(I_post/H), and gives way at F_y = (M_post + min(M_post, M_rail))/H, hinges at foot and knee. In any
-other direction a post is a cantilever: it turns about its foot with 3 E I/H and gives way at M_post.
+other direction a post is a cantilever: it turns about its foot with 3 E I/H and gives way at M_post. What is stated of
+a foot takes the place of what sections and steel say: its stiffness to the side, with all others of its post in
+proportion, its yield to the side, its play.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.quantity import Label, Quantity, parameters
+from ground.quantity import Label, Later, Quantity, parameters
 from rollover.spec.beam import ALONG, Beam
 from rollover.spec.connector import Connector, RateFactor
 from rollover.spec.inertia import MassProperties
@@ -27,6 +29,7 @@ STIFF, STIFF_TURN = 1.0e7, 1.0e6
 # rise of the moment beyond M_p up to which the slope after yield is taken as straight: with a bending stiffness of
 # a E I there, a triangle of plastic curvature over H m/(1 + m) turns by m^2 M_p H/(2 a E I (1 + m))
 RISE = 0.1
+SIDE = np.array([0.0, 1.0, 0.0])
 
 
 @parameters
@@ -36,12 +39,29 @@ class Foot:
     name: Annotated[str, Label("in channels: rops/mount/NAME/force_x")]
     position: Annotated[Point, Quantity("m", "vehicle axes")]
     damping_ratio: Annotated[float, Quantity("1", "of critical, of the frame on its feet", least=0, most=1)] = 0.05
+    side_stiffness: Annotated[
+        float | None, Later(), Quantity("N/m", "of its post to a side load at its top; null: by its section", above=0)
+    ] = None
+    side_yield: Annotated[
+        float | None, Later(), Quantity("N", "of a side load at its top; null: by section and steel", above=0)
+    ] = None
+    play: Annotated[float, Later(), Quantity("m", "of a loose flange, to either side along x, y, z", least=0)] = 0.0
 
 
 def springs(feet: Sequence[Foot], beams: Sequence[Beam], body: MassProperties) -> tuple[Connector, ...]:
     """The feet as connectors. Raises ``ValueError``, path first, for a foot without a member."""
     posts = [_post(foot, beams) for foot in feet]
     return tuple(_spring(foot, k, posts, beams, body) for k, foot in enumerate(feet))
+
+
+def side_stiffnesses(feet: Sequence[Foot], beams: Sequence[Beam], body: MassProperties) -> dict[str, float]:
+    """Of each foot's post against a side load at its top, by the foot's name, N/m."""
+    posts = [_post(foot, beams) for foot in feet]
+    found = {}
+    for k, (foot, spring) in enumerate(zip(feet, springs(feet, beams, body), strict=True)):
+        sways = _rail(k, posts, beams, SIDE) is not None
+        found[foot.name] = spring.stiffness[1] if sways else spring.rotational_stiffness[0] / posts[k][0].length ** 2
+    return found
 
 
 def _post(foot: Foot, beams: Sequence[Beam]) -> tuple[Beam, Array]:
@@ -119,6 +139,15 @@ def _spring(
         r = across / wide / (EI / high)
         shift[d] = 12.0 * EI / high**3 * (1.0 + 6.0 * r) / (4.0 + 6.0 * r)
         force[d] = (plastic + min(plastic, knee)) / high
+    sways = force[1] is not None
+    if foot.side_stiffness is not None:  # of all that follows from the post
+        ratio = foot.side_stiffness / (shift[1] if sways else turn[0] / high**2)
+        shift = [ratio * x if limit is not None else x for x, limit in zip(shift, force, strict=True)]
+        turn = [ratio * x if limit is not None else x for x, limit in zip(turn, moment, strict=True)]
+    if foot.side_yield is not None and sways:
+        force[1] = foot.side_yield
+    elif foot.side_yield is not None:
+        moment[0] = foot.side_yield * high
     mass = body.mass / len(posts)
     return Connector(
         name=foot.name,
@@ -131,6 +160,7 @@ def _spring(
         yield_moment=(moment[0], moment[1], moment[2]),
         hardening=(rise, rise, rise),
         rotational_hardening=(rise, rise, rise),
+        play=(foot.play, foot.play, foot.play),
         rate_factor=None
         if steel.rate_factor is None
         else RateFactor(

@@ -11,7 +11,7 @@ from ground.kinds import ByKind
 from ground.quantity import Later, Quantity, parameters
 from rollover.spec.beam import Beam
 from rollover.spec.connector import Connector
-from rollover.spec.feet import Foot, springs
+from rollover.spec.feet import Foot, side_stiffnesses, springs
 from rollover.spec.inertia import MassProperties
 from rollover.spec.mechanism import Joint, free_motions, sentence
 from rollover.spec.provenance import Provenance
@@ -117,6 +117,12 @@ class Rops:
     def standing(self) -> tuple[Connector, ...]:
         """Mounts, then feet as the springs that stand for their posts."""
         return self.mounts + (springs(self.feet, self.beams, self.body) if self.feet else ())
+
+    @property
+    def side_stiffness(self) -> dict[str, float]:
+        """What each mount and foot puts against a load along y, by its path (`mounts.left`, `feet.left`), N/m."""
+        feet = side_stiffnesses(self.feet, self.beams, self.body)
+        return {f"mounts.{m.name}": m.stiffness[1] for m in self.mounts} | {f"feet.{n}": k for n, k in feet.items()}
 
     @property
     def parts(self) -> dict[str, tuple[MassProperties, tuple[Shape, ...]]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import os
 from pathlib import Path
 
@@ -33,6 +34,7 @@ def results(folder: Path) -> list[Door]:
             ["synthesize", "drop_test", "--out", "rec"],
             ["compare", "drop_test", "rec", "--out", "compared"],
             ["regress", "drop_test", "--workers", "0", "--out", "account"],
+            ["prove", "--cases", "1", "--kinds", "null", "--workers", "0", "--seed", "1", "--export", "sealed"],
         ):
             with (
                 contextlib.redirect_stdout(io.StringIO()),
@@ -147,7 +149,25 @@ def results(folder: Path) -> list[Door]:
             touched=("out/regress.json",),
         )
     ]
+    sealed = taken("sealed", but=(".py", ".md")) | {"truth.json": (folder / "sealed-truth.json").read_bytes()}
+    shown = json.loads(sealed["sealed/seal.json"])["digest"]
+    said = {"case": "case-0001", "verdict": "parameter", "effects": [{"id": "mass", "parameters": {}}]}
+    said |= {"probabilities": {"mass": 0.9, "nothing": 0.1}, "seconds": 1.0}
+    said["effects"][0]["parameters"] = {"added": {"value": 1.0, "low": 0.5, "high": 1.5}}
+    answers_ = {"format": "rollover-answers/1", "by": "me", "seal": shown, "answers": [said]}
+    sealed["a.json"] = json.dumps(answers_, indent=1).encode()
+    words = ["score", "sealed", "a.json", "--truth", "truth.json", *OUT]
+    entries = [
+        Seed(name="answers", files=sealed, words=words, touched=("a.json",), weight=3.0),
+        Seed(
+            name="sealed cases",
+            files=sealed,
+            words=words,
+            touched=("sealed/seal.json", "sealed/benchmark.json", "sealed/candidates.json", "truth.json"),
+        ),
+    ]
     return [
+        Door(name="answers to sealed cases", seeds=entries, weight=0.6),
         Door(name="results", seeds=runs, weight=1.5),
         Door(name="export", seeds=exported, weight=0.8),
         Door(name="view", seeds=view, weight=0.02),
@@ -207,6 +227,8 @@ def options() -> list[Door]:
         (["stability", "side_overturn", "--headings", "x", *OUT], (1,), 0.5),
         (["regress", "nothing", *OUT], (1,), 0.5),
         (["prove", "--kinds", "nothing", "--cases", "1", *OUT], (2,), 0.3),
+        (["prove", "--kinds", "nothing", "--cases", "1", "--export", "out/cases", "--truth", "out/t.json"], (8,), 0.3),
+        (["score", "drop_1.csv", "drop_1.yaml", *OUT], (1,), 0.5),
         (["study", "nothing", *OUT], (1,), 0.5),
         (["view", "nothing", "--html", "out/a.html"], (1,), 0.5),
         (["compare", "drop_test", "drop_1.csv", *OUT], (2,), 0.5),

@@ -91,6 +91,7 @@ def answers() -> Door:
             name="rops set", files=frames, words=[*rops, "--set", "vehicle.rops.feet.0.name=x"], vary=(9,), weight=0.5
         ),
         Seed(name="rops numbers", files=frames, words=rops, vary=(3, 5), weight=0.5),
+        Seed(name="rops speed", files=frames, words=[*rops, "--speed", "1.0"], vary=(9,), weight=0.5),
         Seed(name="new", files={}, words=["new", "scenario", "out/mine"], vary=(1,), weight=0.5),
     ]
     return Door(name="plan, rolling, rops, new", seeds=made, weight=1.5)

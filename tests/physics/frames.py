@@ -59,6 +59,7 @@ def pushed(
     step: float = 0.002,
     segments: int = 24,
     mount: Connector | None = None,
+    speed: float = 0.0,
 ) -> tuple[Frame, np.ndarray, list[Point]]:
     """A frame pushed at places by forces in one proportion; its load is the factor on them, its way their work's."""
     points = {f"load{k}": p for k, p in enumerate(loads)} | {f"foot{k}": p for k, p in enumerate(feet)}
@@ -67,5 +68,5 @@ def pushed(
         meshed, [Support(name=f"foot{k}", node=meshed.at[f"foot{k}"], connector=mount) for k in range(len(feet))]
     )
     c = sum(frame.pattern({meshed.at[f"load{k}"]: 1.0}, way) for k, way in enumerate(loads.values()))
-    curve, _ = push(frame, at_rest(frame), c, step=step, most=most, goal=Way())
+    curve, _ = push(frame, at_rest(frame), c, step=step, most=most, goal=Way(), speed=speed)
     return frame, np.asarray(c), curve

@@ -65,6 +65,78 @@ def test_a_run_on_feet_is_the_frame_of_beams() -> None:
     assert found["permanent_set"] == pytest.approx(beams["permanent_set"], rel=0.15)
 
 
+def with_effects(rops: Rops, changes: dict[str, float]) -> Rops:
+    """The frame that a tractor in an overturn has under effects, in this order."""
+    found = load("side_overturn").replaced({"vehicle.rops": rops} | changes).applied().vehicle.rops  # type: ignore[union-attr]
+    assert found is not None
+    return found
+
+
+STRENGTH = {
+    "effects.rops-elasticity.stiffness": 2e5,
+    "effects.rops-plasticity.yield_force": 9e3,
+    "effects.mount-play.gap": 0.01,
+}
+
+
+def test_effects_of_the_rops_reach_its_feet() -> None:
+    found = with_effects(FRAME, STRENGTH)
+    assert found == with_effects(FRAME, dict(reversed(STRENGTH.items())))
+    (before, _), (left, right) = FRAME.standing, found.standing
+    assert left.stiffness[1] + right.stiffness[1] == pytest.approx(2e5)
+    assert sum(found.side_stiffness.values()) == pytest.approx(2e5)
+    ratio = left.stiffness[1] / before.stiffness[1]
+    assert ratio < 0.5
+    # lengthways in proportion, dashpots by the root; what a post does not decide stays
+    assert left.rotational_stiffness[1] == pytest.approx(ratio * before.rotational_stiffness[1])
+    assert left.damping[1] == pytest.approx(ratio**0.5 * before.damping[1])
+    assert left.rotational_damping[1] == pytest.approx(ratio**0.5 * before.rotational_damping[1])
+    assert (left.stiffness[0], left.stiffness[2]) == (STIFF, STIFF)
+    assert (left.rotational_stiffness[0], left.rotational_stiffness[2]) == (STIFF_TURN, STIFF_TURN)
+    assert left.yield_force == (None, pytest.approx(4.5e3), None)
+    assert left.yield_moment == before.yield_moment
+    assert left.play == right.play == (0.01, 0.01, 0.01)
+
+
+def test_effects_reach_feet_that_turn_and_mounts_beside_them() -> None:
+    """Without a rail a post is k_turn/H^2 at its top and yields at M/H there; a mount beside it has its own share."""
+    alone = replace(FRAME, members=FRAME.beams[:2])
+    left = with_effects(alone, STRENGTH).standing[0]
+    assert left.rotational_stiffness[0] == pytest.approx(1e5 * H**2)
+    assert left.yield_moment[0] == pytest.approx(4.5e3 * H)
+    assert left.yield_force == (None, None, None)
+    assert left.stiffness == (STIFF, STIFF, STIFF)
+    foot = replace(FRAME, feet=FRAME.feet[:1], members=FRAME.beams[:2])
+    own = foot.side_stiffness["feet.left"]
+    mount = load("side_overturn").vehicle.rops.mounts[1]  # type: ignore[union-attr]
+    mount = replace(mount, position=(-0.10, -0.50, 0.85))
+    both = with_effects(replace(foot, mounts=(mount,)), STRENGTH)
+    whole = own + mount.stiffness[1]
+    assert both.side_stiffness == pytest.approx(
+        {"mounts.right": 2e5 * mount.stiffness[1] / whole, "feet.left": 2e5 * own / whole}
+    )
+    assert both.mounts[0].yield_force[1] == pytest.approx(9e3 * mount.stiffness[1] / whole)
+    assert both.standing[1].yield_moment[0] == pytest.approx(9e3 * own / whole * H)
+
+
+@pytest.mark.parametrize("effect", ["rops-elasticity.stiffness", "rops-plasticity.yield_force", "mount-play.gap"])
+def test_an_effect_at_its_null_leaves_feet_as_they_are(effect) -> None:
+    base = load("field_upset_tubes")
+    null = base.replaced({f"effects.{effect}": 0.0 if effect.endswith("gap") else None})
+    assert null.effects
+    assert null.applied().vehicle == base.vehicle
+
+
+def test_what_a_test_says_of_a_foot_takes_the_place_of_its_section(tmp_path) -> None:
+    file = tmp_path / "frame.yaml"
+    text = FILE.read_text()
+    file.write_text(text.replace(RIGHT, RIGHT[:-1] + ", side_stiffness: 2.0e5, side_yield: 15.0e3, play: 0.002}"))
+    left, right = document.load(file, Rops).standing
+    assert left == FRAME.standing[0]
+    assert right.stiffness[1] == pytest.approx(2.0e5)
+    assert (right.yield_force[1], right.play) == (15.0e3, (0.002, 0.002, 0.002))
+
+
 RIGHT = "{name: right, position: [-0.10, -0.50, 0.85]}"
 
 

@@ -35,6 +35,7 @@ DURATIONS = {
     "cube_toss": 0.4,
     "drop_test": 0.4,
     "field_upset_side": 1.5,
+    "field_upset_tubes": 1.5,
     "kerb_trip": 0.6,
     "multiple_roll": 1.2,
     "penetrometer_drop": 0.3,

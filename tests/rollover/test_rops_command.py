@@ -218,3 +218,48 @@ def test_a_frame_by_itself_needs_a_mass(tmp_path) -> None:
     wrong = call("striker_that_is_none", "--mass", "3000")
     assert wrong.exit_code == 2
     assert "no such file" in wrong.stderr
+
+
+def test_a_load_at_a_speed_is_carried_by_more(tmp_path) -> None:
+    """Steel that yields higher the faster it is strained: the same energy takes less way and more force."""
+    file = written(tmp_path, "[70, 70, 5]")
+    found = {}
+    for name, words in {"slow": [], "quick": ["--speed", "3.0"]}.items():
+        done = call(file, "--mass", "3000", "--segments", "6", *words, "--out", tmp_path / name, "--json")
+        assert done.exit_code == 0, done.stderr
+        found[name] = json.loads(done.stdout)
+    slow, quick = found["slow"], found["quick"]
+    assert ("speed" in slow, quick["speed"]) == (False, 3.0)
+    assert "rate of strain are left out" in slow["method"]
+    assert "Loads go at 3 m/s" in quick["method"]
+    rear = [a["tests"][0] for a in (slow, quick)]
+    assert rear[1]["energy"] == pytest.approx(rear[0]["energy"], rel=1e-4)
+    # (3200, 5) at some 3/1.6 1/s: 1.2 of the yield
+    assert 1.1 < rear[1]["mechanism_force"] / rear[0]["mechanism_force"] < 1.35
+    assert rear[1]["deflection"] < rear[0]["deflection"]
+    assert rear[1]["permanent_set"] < rear[0]["permanent_set"]
+    assert "--speed 3" in (tmp_path / "quick" / "report.html").read_text()
+
+
+def test_a_speed_without_a_rate_factor_is_refused(tmp_path) -> None:
+    file = written(tmp_path)
+    file.write_text(file.read_text().replace("material: S355", "material: {base: S355, rate_factor: null}"))
+    done = call(file, "--mass", "3000", "--speed", "1.0", "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "--speed: no steel has a rate factor, got S355; `material: {base: S355, rate_factor:" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_the_frame_alone_leaves_out_is_told(tmp_path) -> None:
+    frame = "vehicle.rops=vehicles/rops/two_post_rear_tubes_3t.yaml"
+    words = ["static_rops_test", "--set", frame, "--segments", "2", "--json"]
+    effects = ["--set", "effects.rops-elasticity.stiffness=2e5", "--set", "vehicle.rops.feet.left.side_yield=1e4"]
+    plain = json.loads(call(*words, "--out", tmp_path / "a").stdout)
+    done = json.loads(call(*words, *effects, "--out", tmp_path / "b").stdout)
+    assert plain["warnings"] == []
+    assert done["warnings"] == [
+        "What is stated of feet is left out, sections and steel count: left.",
+        "Effects of the scenario are left out: rops-elasticity.",
+    ]
+    assert done["tests"] == plain["tests"]

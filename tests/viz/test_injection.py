@@ -53,7 +53,19 @@ MARKS = (
     "$\\frac{$ & </p>",
 )
 HOSTILE = " ".join(MARKS)
-KINDS = ("run", "compare", "two runs", "diagnose", "prove", "regress", "study", "calibrate", "every block", "viewer")
+KINDS = (
+    "run",
+    "compare",
+    "two runs",
+    "diagnose",
+    "prove",
+    "score",
+    "regress",
+    "study",
+    "calibrate",
+    "every block",
+    "viewer",
+)
 KINDS += tuple(spoilt.PAGES)
 ABOUT: dict[str, Any] = {"scenario_hash": HOSTILE, "versions": {HOSTILE: HOSTILE}}
 
@@ -112,9 +124,10 @@ def page_of(kind: str, folder: Path) -> str:
         found = replace(sensor_at_fault(), notes=(HOSTILE,), sentence=HOSTILE)
         shown = tuple(replace(t, recording=HOSTILE) for t in overlays())
         return diagnosis.page(found, shown, title=HOSTILE, command=HOSTILE, **ABOUT)
-    if kind == "prove":
+    if kind in ("prove", "score"):
         rows = [row(HOSTILE, "single", "mass", "mass"), row("case-0002", "null", "", HOSTILE)]
-        account = {"seed": 7, "summary": tally(rows), "rows": rows, "seal": {"digest": HOSTILE, "algorithm": HOSTILE}}
+        whose = {"seed": 7} if kind == "prove" else {"by": HOSTILE}
+        account = {**whose, "summary": tally(rows), "rows": rows, "seal": {"digest": HOSTILE, "algorithm": HOSTILE}}
         return proof.page(account, command=HOSTILE, versions={HOSTILE: HOSTILE})
     if kind == "regress":
         answer_ = Answer(scenario=HOSTILE, verdict="failed", sentence=HOSTILE, notes=(HOSTILE,))
@@ -149,6 +162,7 @@ def page_of(kind: str, folder: Path) -> str:
 def test_no_kind_of_page_is_left_out() -> None:
     """Whatever writes a page is among `KINDS`: one that is added later is tried too."""
     by_kind = {"run": "report", "compare": "comparison", "two runs": "pair", "diagnose": "diagnosis", "prove": "proof"}
+    by_kind |= {"score": "proof"}
     by_kind |= {"regress": "regression", "calibrate": "calibration", "viewer": "web_page", "every block": "page"}
     write = {m.name for m in pkgutil.iter_modules(pages.__path__) if _writes_a_page(m.name)}
     assert write == {by_kind.get(kind, kind) for kind in KINDS} - {"page"}

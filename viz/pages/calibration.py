@@ -14,10 +14,10 @@ from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, N
 from viz.content.differences import differences_section
 from viz.content.entities import series
 from viz.figures import plots
-from viz.figures.corner import corner
 from viz.figures.heat_map import heat_map
 from viz.figures.plots import Curve, Level
 from viz.pages.page import render
+from viz.pages.posterior import open_values
 
 OPEN = 4  # figures of curves that are not folded away
 BELOW = 0.1  # of chi-squared: less is the roughness of contacts that fall between two steps or not
@@ -199,26 +199,10 @@ def headline(c: Calibration) -> Headline:
 
 def _posterior(c: Calibration, drawn: Posterior) -> list[Block]:
     """The draws pair by pair, and what they say of each value."""
-    values = c.draws
-    names = [f"{p.path}, {p.unit}" if p.unit else p.path for p in c.parameters]
-    figure = Figure(
-        svg=corner(names, values, [e.value for e in c.estimates]),
-        caption="Draws of the posterior: 68 % and 95 % lie within the shades; lines are the fitted values.",
-    )
-    columns = ["parameter", "mean", "deviation", "2.5 %", "median", "97.5 %", "R-hat", "steps worth one", "independent"]
-    rows: list[list[str | Cell]] = []
-    for k, p in enumerate(c.parameters):
-        low, median, high = np.quantile(values[:, k], [0.025, 0.5, 0.975])
-        numbers = (values[:, k].mean(), values[:, k].std(ddof=1), low, median, high)
-        each = drawn.r_hat[k], drawn.autocorrelation[k], drawn.effective[k]
-        agree = Cell(f"{each[0]:.3f}", "" if drawn.is_mixed else "warn")
-        rows.append([p.path, *(f"{v:.5g}" for v in numbers), agree, f"{each[1]:.2g}", f"{each[2]:.0f}"])
-    text = (
-        f"{len(values)} draws by {drawn.sampler}: {drawn.walkers} walkers, {drawn.steps} steps after {drawn.warm_up}, "
-        f"{drawn.acceptance:.0%} of the jumps accepted. Prior: uniform between the bounds, of the logarithm where they "
-        "are spaced logarithmically. The draws are posterior.csv."
-    )
-    return [figure, Table(columns=columns, rows=rows, numeric=range(1, 9)), Note(text=text)]
+    prior = "Prior: uniform between the bounds, of the logarithm where they are spaced logarithmically."
+    names, units = [p.path for p in c.parameters], [p.unit for p in c.parameters]
+    blocks = open_values(names, units, c.draws, [e.value for e in c.estimates], drawn, prior)
+    return blocks[:3]  # what is to be said of walkers stands among the warnings
 
 
 def _row(e: Estimate) -> list[str | Cell]:

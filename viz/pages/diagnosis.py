@@ -19,6 +19,7 @@ from viz.content.entities import series
 from viz.figures import plots
 from viz.figures.plots import Curve
 from viz.pages.page import render
+from viz.pages.posterior import open_values
 
 LEAST_SHARE = 0.01  # of a force that some quantity predicts, that is worth a table
 PICTURES = 3  # recordings shown in full view; the others are folded away
@@ -77,7 +78,13 @@ def _found(found: Diagnosis) -> list[Block]:
         caption="95 % intervals, SI. The scenario with these values stands in scenario-diagnosed.yaml.",
     )
     notes: list[Block] = [Note(text=f"{e.statement} ({_chance(e.p_value)})") for e in found.effects]
-    return [Section(title="What was found", blocks=[*notes, table])]
+    sections: list[Block] = [Section(title="What was found", blocks=[*notes, table])]
+    if (d := found.posterior) is not None:
+        prior = "Prior: uniform over the range of the search, of the logarithm where that is looked for."
+        beside = Note(text="What a small error of the model would do is in the intervals above, not in the draws.")
+        blocks = [*open_values(d.names, d.units, d.values, d.fitted, d.convergence, prior), beside]
+        sections.append(Section(title="What stays open", blocks=blocks))
+    return sections
 
 
 def _where(found: Diagnosis, overlays: Sequence[Overlay], each: Each) -> list[Block]:

@@ -38,14 +38,19 @@ KINDS = {"unexplained": "unexplained", "near": "a near relative", "wrong": "a wr
 
 
 def page(account: Mapping[str, Any], *, command: str, versions: Mapping[str, str]) -> str:
-    """HTML of a proof from its prove.json."""
+    """HTML of a proof from its prove.json, or of answers to sealed cases from their score.json."""
     summary = account["summary"]
+    is_proof = "seed" in account
+    title = f"Blind proof of the diagnosis: {summary['cases']} concealed cases, seed {account.get('seed')}"
+    if not is_proof:
+        title = f"Answers by {account['by'] or 'somebody'} to {summary['cases']} sealed cases"
     blocks = [*_answers(summary), *_false_alarms(summary), *_confusion(summary), *_groups(summary)]
     blocks += [*sections(summary), *_values(summary), *_failures(account), *_seal(account)]
     seal = account["seal"]["digest"]
     return render(
-        title=f"Blind proof of the diagnosis: {summary['cases']} concealed cases, seed {account['seed']}",
-        subtitle="Cases made by an independent solver, sealed before the first diagnosis",
+        title=title,
+        subtitle="Cases made by an independent solver, sealed before the first "
+        + ("diagnosis" if is_proof else "answer"),
         headline=headline(summary),
         blocks=blocks,
         footer=Footer(command=command, scenario_hash=seal, hash_of="Seal", versions=versions),
@@ -219,6 +224,8 @@ def _failures(account: Mapping[str, Any]) -> list[Block]:
 def _seal(account: Mapping[str, Any]) -> list[Block]:
     rule = f"{account['seal']['algorithm']}: {account['seal']['digest']}."
     text = f"It was shown before the first diagnosis; truth.json beside this page has salt and truths. {rule}"
+    if "seed" not in account:
+        text = f"It stands beside the cases; the truth that was read for this page has the salt. {rule}"
     return [Section(title="The seal", blocks=[Note(text=text)])]
 
 

@@ -20,6 +20,7 @@ from rollover.cli.commands import synthesize
 from rollover.cli.commands import diagnose
 from rollover.cli.commands import plan
 from rollover.cli.commands import prove
+from rollover.cli.commands import score
 from rollover.cli.commands import stability
 from rollover.cli.commands import rolling
 from rollover.cli.commands import rops
@@ -43,6 +44,7 @@ __all__ = [
     "rops",
     "run",
     "schema",
+    "score",
     "stability",
     "study",
     "synthesize",

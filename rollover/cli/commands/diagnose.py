@@ -35,7 +35,8 @@ MOST_TOLERATED = 0.5  # of a range: what may miss half of it is no model of it
     epilog=manual(
         "diagnose drop_test rec --out out/diagnosis",
         "diagnose --model duffing rec --out out/model",
-        writes="diagnosis.json, scenario-diagnosed.yaml (it runs), report.html, diagnosis.rrd; of a model the first.",
+        writes="diagnosis.json, scenario-diagnosed.yaml (it runs), report.html, diagnosis.rrd; with --posterior "
+        "posterior.csv; of a model the first.",
     )
 )
 @answering
@@ -96,6 +97,10 @@ def diagnose(
             show_default="it is done",
         ),
     ] = None,
+    posterior: Annotated[
+        bool, typer.Option("--posterior/--no-posterior", help="Sample what the recordings leave open of what is named.")
+    ] = False,
+    draws: Annotated[int, typer.Option(help="Draws of the posterior.", min=500, max=1_000_000)] = 3000,
     set_: Setting = None,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
@@ -117,6 +122,7 @@ def diagnose(
             "--reference": reference,
             "--estimate": estimate,
             "--second-opinion": second_opinion,
+            "--posterior": posterior,
         }
         _diagnose_model(
             model,
@@ -139,17 +145,24 @@ def diagnose(
         begin_server("rollover.diagnosis.fit.warmup")
 
     from rollover.assessment import results
+    from rollover.calibration.posterior import installed, table
     from rollover.cli import console
     from rollover.comparison.recordings import held_out, read
     from rollover.diagnosis import account, diagnosed_text
     from rollover.diagnosis.fit.jobs import Executor
-    from rollover.diagnosis.io import FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
+    from rollover.diagnosis.io import DRAWS, FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
     from rollover.diagnosis.overlay import series
     from rollover.diagnosis.sensors_first import check, diagnosed, plain, sensor_precheck
+    from rollover.dynamics.drop_test import unfit
     from rollover.spec import document
     from rollover.system.writing import notes
 
     path, chosen = scenario_with(scenario, set_)
+    if posterior:
+        installed()
+        if unfit(chosen):
+            message = "of drops only, got an overturn, whose draws are runs; without it, or calibrate --posterior"
+            raise InputError(Fault(file="--posterior", message=message))
     measured = read(recordings, profile)
     check(chosen, measured)
     held = held_out(list(measured), hold_out or [], "--hold-out")
@@ -170,6 +183,7 @@ def diagnose(
         "tolerance": allowed,
         "reference": taught,
         "estimate": how,
+        **({"draws": draws} if posterior else {}),
     }
     about["origin"] = results.origin(path, folder, set_ or [])
     results.claim_account(folder, FORMAT, about, FILES, force=force, say=console.say)
@@ -179,6 +193,7 @@ def diagnose(
     notebook = notes(folder)
     about_fits = json.dumps([about, results.versions()], sort_keys=True)
     words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, tolerance, reference, set_, profile)]
+    words += ["--posterior", "--draws", str(draws)] if posterior else []
     words += [] if how == "unexplained" else ["--estimate" if how else "--no-estimate"]
     with Executor(workers, notebook, about_fits) as executor:
         found = diagnosed(
@@ -189,6 +204,7 @@ def diagnose(
             tolerance=allowed,
             reference=taught,
             estimate=how,
+            posterior=draws if posterior else 0,
             say=console.say,
             executor=executor,
         )
@@ -196,6 +212,8 @@ def diagnose(
         answer = account(found, about, plain(findings))
         with results.whole(folder) as part, ThreadPoolExecutor(1) as beside:
             results.write_json(part / JSON, answer)
+            if found.posterior is not None:
+                (part / DRAWS).write_text(table(found.posterior.names, found.posterior.values), encoding="utf-8")
             (part / SCENARIO).write_text(diagnosed_text(chosen, found), encoding="utf-8")
             drawn = beside.submit(_draw, found, overlays, part / PICTURE, chosen.title)
             from viz.pages.diagnosis import page
@@ -214,6 +232,8 @@ def diagnose(
             (part / PAGE).write_text(text, encoding="utf-8")
             drawn.result()
     executor.close()
+    if posterior and found.posterior is None:
+        console.say("--posterior: nothing is named, so that there are no draws")
     if as_json:
         print(json.dumps(answer, indent=2))
     else:

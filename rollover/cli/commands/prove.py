@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.cli.commands.common import FAILED, AsJson, Force, answering, app, manual
+from rollover.cli.commands.sealing import Order, write_sealed_cases
 from rollover.system.arguments import LONGEST
 from rollover.system.errors import Fault, InputError
 
@@ -22,14 +23,29 @@ ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES, PAGE)
 @app.command(
     epilog=manual(
         "prove --cases 50 --seed 1",
-        writes="prove.json, report.html, seal.json, truth.json, diagnoses.jsonl.",
+        "prove --cases 20 --export out/cases",
+        writes="prove.json, report.html, seal.json, truth.json, diagnoses.jsonl; with --export sealed cases.",
         status="3 every diagnosis failed",
     )
 )
 @answering
 def prove(
     cases: Annotated[int, typer.Option(help="How many concealed campaigns of tests.", min=1)] = 50,
-    seed: Annotated[int, typer.Option(help="Another seed, other cases; the same seed, the same ones.", min=0)] = 1,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            help="Another seed, other cases; the same seed, the same ones.",
+            show_default="1; with --export one that nobody knows",
+            min=0,
+        ),
+    ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Diagnose nothing: write the cases here for others, for `rollover score`."),
+    ] = None,
+    truth: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Of --export: the truth.", show_default="DIR-truth.json")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/prove"),
     workers: Annotated[int | None, typer.Option(help="Cases at once", show_default="number of cores", min=0)] = None,
     rig: Annotated[str, typer.Option(help="What is tested: drop, or overturn (minutes a case).")] = "drop",
@@ -61,6 +77,26 @@ def prove(
     from rollover.cli import console
     from rollover.proof import runner
 
+    if export is None and truth is not None:
+        raise InputError(Fault(file="--truth", message=f"without --export, got {truth}; --export DIR beside it"))
+    if export is not None:
+        write_sealed_cases(
+            Order(
+                cases=cases,
+                seed=seed,
+                rig=rig,
+                kinds=kinds or [],
+                effects=effects or [],
+                background=None if background is None else _share_of(background),
+                workers=workers,
+            ),
+            export,
+            truth or export.with_name(f"{export.name}-truth.json"),
+            force=force,
+            as_json=as_json,
+        )
+        return
+    seed = 1 if seed is None else seed
     about = {"cases": cases, "seed": seed, "kinds": kinds or [], "effects": effects or []}
     about |= {"rig": rig} if rig != "drop" else {}
     about |= {"background": _share_of(background)} if background is not None else {}

@@ -45,6 +45,15 @@ def rops_(
     ] = None,
     segments: Annotated[int, typer.Option(help="Elements to a member.", min=2, max=200)] = SEGMENTS,
     clamped: Annotated[bool, typer.Option("--clamped", help="Feet held still instead of on their mounts.")] = False,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            help="Of each load, m/s: what has a rate factor yields higher by it.",
+            show_default="infinitely slow",
+            min=1e-6,
+            max=50.0,
+        ),
+    ] = None,
     set_: Setting = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/rops/NAME")] = None,
     force: Force = False,
@@ -65,7 +74,7 @@ def rops_(
     results.claim_account(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
     try:
         with told(file_of(name)), console.counting("loads") as show:
-            found = frame_test(chosen, segments=segments, clamped=clamped, progress=show)
+            found = frame_test(chosen, segments=segments, clamped=clamped, speed=speed or 0.0, progress=show)
     except ArithmeticError as e:
         console.say(f"{name}: {e}")
         raise typer.Exit(FAILED) from None
@@ -73,6 +82,7 @@ def rops_(
     words = [] if mass is None else ["--mass", f"{mass:g}"]
     words += ["--segments", str(segments)] if segments != SEGMENTS else []
     words += ["--clamped"] if clamped else []
+    words += ["--speed", f"{speed:g}"] if speed else []
     words += [word for s in set_ or [] for word in ("--set", s)]
     text = page(answer, command=" ".join(map(shlex.quote, ["rollover", "rops", name, *words])))
     hand_out(answer, text, folder, (JSON, PAGE), as_json=as_json, show=lambda: console.rops(answer, str(folder)))

@@ -23,6 +23,14 @@ def written(kind: str, name: str) -> Mapping[str, str]:
     return _KINDS[kind](name)
 
 
+def of_sealed_cases(cases: int, rig: str, digest: str) -> Mapping[str, str]:
+    """What stands beside sealed cases: the baseline as a function, and how they are answered."""
+    words = {"@CASES@": str(cases), "@RIG@": "drops" if rig == "drop" else "side overturns", "@DIGEST@": digest}
+    text = _text("benchmark.txt").read_text(encoding="utf-8")
+    readme = re.sub("|".join(words), lambda found: words[found[0]], text)
+    return {"README.md": readme, "baseline.py": _text("baseline.txt").read_text(encoding="utf-8")}
+
+
 def _scenario(name: str) -> Mapping[str, str]:
     head = (
         f"{name}: a tractor tips over sideways onto flat clay.\n"

@@ -6,7 +6,8 @@ turn in the axial strain (von Karman),
     e = (u_2 - u_1)/L + ((v_2 - v_1)^2 + (w_2 - w_1)^2)/(2 L^2),   fibre strain e - p v'' - r w'',
 
 so that a load that leans with the frame is taken at its lean. Torsion yields by itself at T_pl; shear deflection and
-the interaction of torsion with bending are left out.
+the interaction of torsion with bending are left out. In a step that takes a time, what has a rate factor yields
+higher; of torsion the rate of strain is that which does the same work at f_y all over the section, T_pl t'/(f_y A).
 """
 
 from __future__ import annotations
@@ -116,7 +117,7 @@ class Frame:
         self.D = np.stack([np.ones_like(self.p), -self.p, -self.r], axis=-1)  # (m, n, 3)
         self.AD = self.area[:, :, None] * self.D
         self.ADD = (self.AD[:, :, :, None] * self.D[:, :, None, :]).reshape(*self.p.shape, 9)
-        E, fy, tangent, G, J, twist = (
+        E, fy, tangent, G, J, twist, A, D, q = (
             np.array(x, dtype=float)[owner]
             for x in zip(
                 *(
@@ -127,6 +128,9 @@ class Frame:
                         b.material.shear_modulus,
                         b.section.properties.torsion,
                         b.plastic_resistance[3],
+                        b.section.properties.area,
+                        b.material.rate_factor.rate if b.material.rate_factor is not None else 0.0,
+                        b.material.rate_factor.exponent if b.material.rate_factor is not None else 1.0,
                     )
                     for b in beams
                 ),
@@ -135,13 +139,13 @@ class Frame:
         )
         m, n = self.p.shape
         wide = (slice(None), None, None)
-        fibre = Law.of(E[wide], fy[wide], (tangent / E)[wide], (m, 3, n))
-        torsion = Law.of(G * J, twist, tangent / E, (m,))
+        fibre = Law.of(E[wide], fy[wide], (tangent / E)[wide], (m, 3, n), D[wide], q[wide])
+        torsion = Law.of(G * J, twist, tangent / E, (m,), D * fy * A / twist, q)
         springs = [s.connector.row for s in self.springs if s.connector is not None]
-        table = np.array(springs)[:, :31].reshape(-1, 31) if springs else np.zeros((0, 31))
+        table = np.array(springs).reshape(-1, 37)
         k, limit, H = table[:, 0:6], table[:, 12:18], table[:, 18:24]
         ratio = np.divide(H, k + H, out=np.zeros_like(H), where=k + H > 0.0)
-        support = Law.of(k, limit, ratio, k.shape)
+        support = Law.of(k, limit, ratio, k.shape, table[:, 30:36], table[:, 36:])
         self.start = Memory(fibre=fibre, torsion=torsion, support=support)
 
     def _shapes(self) -> None:
@@ -158,8 +162,8 @@ class Frame:
         for k, v in enumerate((1, 2)):
             self.way[k, v], self.way[k, 6 + v] = -1.0, 1.0
 
-    def tried(self, u: Array, memory: Memory) -> Tried:
-        """Forces and stiffness at the displacements `u` (6 n,), from what is plastic in `memory`."""
+    def tried(self, u: Array, memory: Memory, h: float = np.inf) -> Tried:
+        """Forces and stiffness at the displacements `u` (6 n,), `h` (s) after what is plastic in `memory`."""
         own = np.einsum("mij,mj->mi", self.T, u[self.dofs])
         L = self.L
         chord = np.einsum("ki,mi->mk", self.way, own) / L[:, None]
@@ -168,7 +172,7 @@ class Frame:
         strains = np.einsum("msci,mi->msc", self.B, own)
         strains[:, :, 0] += 0.5 * np.sum(chord**2, axis=1)[:, None]
         fibre = strains @ self.D.transpose(0, 2, 1)
-        stress, slope, plastic = memory.fibre.tried(fibre)
+        stress, slope, plastic = memory.fibre.tried(fibre, h)
         sections = stress @ self.AD
         m = len(L)
         stiff = (slope @ self.ADD).reshape(m, 3, 3, 3)
@@ -178,7 +182,7 @@ class Frame:
         K = whole_B.transpose(0, 2, 1) @ ((weight[:, :, None, None] * stiff) @ B).reshape(m, 9, 12)
         axial = np.einsum("s,ms->m", WEIGHTS, sections[:, :, 0])
         K += np.einsum("m,ki,kj->mij", axial / L, self.way, self.way)
-        twist, twists, twisted = memory.torsion.tried((own[:, 9] - own[:, 3]) / L)
+        twist, twists, twisted = memory.torsion.tried((own[:, 9] - own[:, 3]) / L, h)
         force[:, 3] -= twist
         force[:, 9] += twist
         for i, j, sign in ((3, 3, 1.0), (9, 9, 1.0), (3, 9, -1.0), (9, 3, -1.0)):
@@ -186,7 +190,7 @@ class Frame:
         whole = np.zeros(len(u))
         np.add.at(whole, self.dofs, np.einsum("mji,mj->mi", self.T, force))
         K = self.T.transpose(0, 2, 1) @ K @ self.T
-        held, held_slope, held_plastic = memory.support.tried(self._at_supports(u))
+        held, held_slope, held_plastic = memory.support.tried(self._at_supports(u), h)
         for spring, f in zip(self.springs, held, strict=True):
             whole[6 * spring.node : 6 * spring.node + 6] += f
         values = np.concatenate([K.ravel(), held_slope.ravel()])[self.kept]

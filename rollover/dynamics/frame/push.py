@@ -65,15 +65,16 @@ def at_rest(frame: Frame) -> State:
     return State(u=u, tried=frame.tried(u, frame.start))
 
 
-def moved(frame: Frame, state: State, c: Array, way: float, force: float) -> tuple[State, float]:
+def moved(frame: Frame, state: State, c: Array, way: float, force: float, speed: float = 0.0) -> tuple[State, float]:
     """The balance where `c` u has grown by `way` (m), and the force along c that it takes; `force` is a first guess.
 
-    Raises ``ArithmeticError``.
+    At a `speed` (m/s) it takes a time; at 0 the steel has all the time there is. Raises ``ArithmeticError``.
     """
     free, u, target = frame.free, state.u.copy(), float(c @ state.u) + way
     cf, moves = c[free], FAR
+    h = way / speed if speed > 0.0 else np.inf
     for _ in range(ITERATIONS):
-        tried = frame.tried(u, state.memory)
+        tried = frame.tried(u, state.memory, h)
         residual = tried.force[free] - force * cf
         gap = float(c @ u) - target
         worst, scale = float(np.abs(residual).max()), np.abs(tried.force).sum() + abs(force) + 1e-3
@@ -90,13 +91,13 @@ def moved(frame: Frame, state: State, c: Array, way: float, force: float) -> tup
     raise ArithmeticError(NO_BALANCE)
 
 
-def let_go(frame: Frame, state: State, c: Array, force: float) -> State:
-    """The frame without the load that it carries along c. Raises ``ArithmeticError``."""
+def let_go(frame: Frame, state: State, c: Array, force: float, h: float = np.inf) -> State:
+    """The frame without the load that it carries along c, taken off within `h` (s). Raises ``ArithmeticError``."""
     free = frame.free
     for share in np.linspace(force, 0.0, UNLOADING + 1)[1:]:
         u, moves = state.u.copy(), FAR
         for _ in range(ITERATIONS):
-            tried = frame.tried(u, state.memory)
+            tried = frame.tried(u, state.memory, h / UNLOADING)
             residual = tried.force[free] - share * c[free]
             if moves <= STILL or np.abs(residual).max() <= RESIDUAL * (np.abs(tried.force).sum() + abs(force) + 1e-3):
                 break
@@ -117,10 +118,11 @@ def push(
     step: float,
     most: float,
     goal: Goal,
+    speed: float = 0.0,
 ) -> tuple[list[Point], str]:
     """Curve of a load along c: from no force in steps of deflection up to `step` (m) until the goal or `most` (m).
 
-    Returns the points and how it ended: reached, given up: ...
+    `speed` (m/s) is that of the deflection, as in `moved`. Returns the points and how it ended: reached, given up: ...
     """
     points = [Point(deflection=0.0, force=0.0, energy=0.0, state=state)]
     size, halved = step / FIRST, 0
@@ -128,7 +130,7 @@ def push(
         last = points[-1]
         guess = _ahead(points, size)
         try:
-            after, force = moved(frame, last.state, c, size, guess)
+            after, force = moved(frame, last.state, c, size, guess, speed)
         except ArithmeticError as e:
             halved += 1
             if halved > HALVINGS:
@@ -137,7 +139,7 @@ def push(
             continue
         now = _next(last, size, force, after)
         if goal.missing(now) <= 0.0 < goal.missing(last):
-            now = _met(frame, c, goal, last, now)
+            now = _met(frame, c, goal, last, now, speed)
         points.append(now)
         if goal.reached(points):
             return points, "reached"
@@ -147,7 +149,7 @@ def push(
             size, halved = min(step, 2.0 * size), max(halved - 1, 0)
 
 
-def _met(frame: Frame, c: Array, goal: Goal, last: Point, beyond: Point) -> Point:
+def _met(frame: Frame, c: Array, goal: Goal, last: Point, beyond: Point, speed: float) -> Point:
     """The point between two at which the goal is met, by false position; a little beyond it, never before."""
     low, high, size = (0.0, goal.missing(last)), (1.0, goal.missing(beyond)), beyond.deflection - last.deflection
     for _ in range(ITERATIONS):
@@ -156,7 +158,7 @@ def _met(frame: Frame, c: Array, goal: Goal, last: Point, beyond: Point) -> Poin
         share = low[0] + (high[0] - low[0]) * low[1] / (low[1] - high[1])
         share += CLOSE * (high[0] - share)  # just beyond, so that both ends close in
         way = share * size
-        after, force = moved(frame, last.state, c, way, last.force)
+        after, force = moved(frame, last.state, c, way, last.force, speed)
         now = _next(last, way, force, after)
         if (left := goal.missing(now)) > 0.0:
             low = (share, left)
