@@ -135,6 +135,24 @@ def test_drops_share_what_their_conditions_leave_as_it_is() -> None:
     assert one.tolist() != DropModel(scenario=own).kernel_law[1].tolist()
 
 
+def test_a_scenario_under_conditions_is_made_once_for_the_same_alone() -> None:
+    base = scenario()
+    ((_, asked),) = recorded({}, speeds=(2.0,))
+    assert asked.conditions == {"initiation.speed": 2.0}
+    found = set_up(base, asked)
+    assert set_up(base, asked) is found
+    assert isinstance(found.initiation, Drop)
+    assert found.initiation.speed == 2.0
+    # another value, another scenario; and a value that has no hash
+    for other in (2.5, np.float64(3.0)):
+        moved = set_up(base, replace(asked, conditions={"initiation.speed": other})).initiation
+        assert isinstance(moved, Drop)
+        assert moved.speed == other
+    assert set_up(base.replaced({"gravity": 9.0}), asked).gravity == 9.0
+    wide = {"ground.elements.spacing": [0.05, 0.05]}
+    assert set_up(base, replace(asked, conditions=wide)).ground.elements.spacing == (0.05, 0.05)
+
+
 def test_a_clock_of_its_own_is_simulated_at_its_own_stamps() -> None:
     name, recording = recorded({}, speeds=(2.0,), channels=(FORCE, DEPTH, ACCELERATION), noise=1e-4)[0]
     simulator = simulator_of(scenario(), recording)
