@@ -35,7 +35,7 @@ def card(
 def _row(tag: str, cells: Sequence[str], words: Collection[int]) -> str:
     sides = ("left" if k in words else "right" for k in range(len(cells)))
     made = (
-        f'<{tag} style="text-align:{side}">{escape(excerpt(cell))}</{tag}>'
+        f'<{tag} style="text-align:{side};padding:.1em .6em">{escape(excerpt(cell))}</{tag}>'
         for side, cell in zip(sides, cells, strict=True)
     )
     return f"<tr>{''.join(made)}</tr>"

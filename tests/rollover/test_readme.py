@@ -211,7 +211,7 @@ def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
     for name in set(rollover_package.__all__) - {"__version__"}:
         assert f"<h2>{name}<" in python, f"{name}: a public name that the reference does not have"
     assert "Path of a YAML file, or a name such as" in python
-    notebook = (tmp_path / "site" / "tutorials" / "notebook.html").read_text()
+    notebook = (tmp_path / "site" / "docs" / "tutorials" / "notebook.html").read_text()
     shown = re.findall(r'<div class="cell_output.*?(?=<div class="cell |</section>)', notebook, flags=re.DOTALL)
     for answer in (
         "rops/force",

@@ -22,8 +22,10 @@ from tests.viz.browser import CHROMIUM, has_browser
 from tests.viz.html import Parts
 from tests.viz.test_proof_page import row
 from tests.viz.test_study_page import written
+from viz.content.blocks import Footer, Headline, Table
 from viz.pages import comparison, diagnosis, proof, regression, report
 from viz.pages import pair as pair_page
+from viz.pages.page import render
 
 KINDS = ("run", "compare", "two runs", "diagnose", "prove", "regress", "study")
 HASH = "c0ffee" * 10 + "beef"
@@ -198,4 +200,29 @@ def test_no_number_and_no_heading_is_broken_on_paper(kind: str, pages: dict[str,
     tab.goto(pages[kind].as_uri())
     tab.emulate_media(media="print")
     assert tab.evaluate(BROKEN) == []
+    context.close()
+
+
+@needs_browser
+def test_a_table_of_long_words_leaves_numbers_and_headings_whole(browser: Any, tmp_path: Path) -> None:
+    words = (
+        "load 'crush-rear' reached at 2 mm and 60.0 kN, 0 mm left, of what the sequence asks of a tractor of this mass"
+    )
+    rows = [[f"OECD Code 4: {words}", "43.5 kN", "1234.567 kN", "impact-speed, momentum", words, "2.836", "14.79"]] * 2
+    heads = ("requirement", "asked", "simulated", "verdict", "how", "at, s", "CFC 60")
+    table = Table(columns=heads, rows=rows, numeric=(1, 2, 5, 6))
+    path = tmp_path / "table.html"
+    path.write_text(
+        render(
+            title="Table", headline=Headline(sentence="A table."), blocks=[table], footer=Footer(command="rollover x")
+        ),
+        encoding="utf-8",
+    )
+    context = browser.new_context(offline=True, viewport={"width": round(PAPER[0] / 25.4 * 96), "height": 900})
+    tab = context.new_page()
+    tab.goto(path.as_uri())
+    tab.emulate_media(media="print")
+    assert tab.evaluate(BROKEN) == []
+    wide = tab.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+    assert wide <= 1, "and nothing is cut off"
     context.close()

@@ -146,10 +146,14 @@ def _profiles(c: Calibration) -> list[Block]:
         places = np.linspace(found.places[0], found.places[-1], 81)
         profile = pchip_interpolate(found.places, found.rises, places) if len(found.places) > 1 else 0.0 * places
         values = np.array([p.value(float(u)) for u in places])
+        parabola = ((places - found.fit) / found.sigma) ** 2
+        shown = parabola <= max(
+            1.2 * float(profile.max()), 2.0 * CHI2_95
+        )  # where the two part, the profile is to be seen
         svg = plots.xy(
             [
                 Curve(name="others fitted anew", x=values, y=profile),
-                Curve(name="quadratic", x=values, y=((places - found.fit) / found.sigma) ** 2, role="muted"),
+                Curve(name="quadratic", x=values[shown], y=parabola[shown], role="muted"),
             ],
             across=f"{p.path}{', ' if _unit(p.unit) else ''}{_unit(p.unit)}",
             label="rise of the squared misfit",
