@@ -22,7 +22,7 @@ MIDNIGHT = dt.datetime(2026, 11, 29, 23, 59, 59, 998000)
 MS = dt.timedelta(milliseconds=1)
 
 
-def book(path: Path, rows: Sequence[Sequence[Any]]) -> Path:
+def book(path: Path, rows: Sequence[Any]) -> Path:
     made = openpyxl.Workbook()
     for row in rows:
         made.active.append(row)
@@ -30,7 +30,7 @@ def book(path: Path, rows: Sequence[Sequence[Any]]) -> Path:
     return path
 
 
-def read(folder: Path, rows: Sequence[Sequence[Any]], more: str = "", **columns: str) -> Recording:
+def read(folder: Path, rows: Sequence[Any], more: str = "", **columns: str) -> Recording:
     return named(book(folder / "a.xlsx", rows), columns or {"t": "time, unit: s", "F": f"{FORCE}, unit: N"}, more)
 
 

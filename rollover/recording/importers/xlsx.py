@@ -145,8 +145,8 @@ def _moments(cells: Sequence[Any]) -> Signal | None:
     if kinds == {"time of day"}:
         days = days + np.concatenate([[0.0], np.cumsum(np.diff(days) < -0.5)])  # over midnight
     notes = () if kinds == {"date"} else (_OF_DAY,)
-    ns = _without_rounding(days * DAY)
-    return Signal(values=(ns - ns[0]) / NANO, unit="s", began=int(ns[0]), notes=notes)
+    at = _without_rounding(days * DAY)
+    return Signal(values=(at - at[0]) / NANO, unit="s", began=int(at[0]), notes=notes)
 
 
 def _without_rounding(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
