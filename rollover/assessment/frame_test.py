@@ -116,7 +116,8 @@ def _refuse(rops: Rops, speed: float) -> None:
     if rops.upper is not None:
         message = "a frame in two parts is not calculated alone, got an upper part on hinges; null, or `rollover run`"
         raise InputError(Fault(path="vehicle.rops.upper", message=message))
-    if speed > 0.0 and not any(x.rate_factor for x in (*(b.material for b in rops.beams), *rops.mounts)):
+    factors = [*(b.material.rate_factor for b in rops.beams), *(m.rate_factor for m in rops.mounts)]
+    if speed > 0.0 and not any(factors):
         names = ", ".join(sorted({b.material.name for b in rops.beams}))
         cure = "`material: {base: S355, rate_factor: {rate: 3200, exponent: 5}}` for one that has"
         message = f"no steel has a rate factor, got {names}; {cure}"

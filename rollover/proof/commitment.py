@@ -16,9 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rollover.system.boundary import reading
 from rollover.system.errors import Fault, InputError
 
 SEAL, TRUTH = "seal.json", "truth.json"
+CURE = "the file that `rollover prove` wrote is needed"
 SEAL_FORMAT, TRUTH_FORMAT = "rollover-seal/1", "rollover-truths/1"
 
 
@@ -68,14 +70,14 @@ def write_truth(
 
 def opened(shown: str, path: Path) -> list[dict[str, Any]]:
     """Truths of a truth.json whose seal was `shown` before. Raises `InputError` if it is not the same truth."""
-    try:
+    with reading(path, "truth that was sealed", CURE):
         found = json.loads(path.read_text(encoding="utf-8"))
-        truths, salt = found["truths"], found["salt"]
-        if found.get("format") != TRUTH_FORMAT or not isinstance(truths, list) or not isinstance(salt, str):
-            raise ValueError(f"format {TRUTH_FORMAT!r} is needed")
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as e:
-        raise InputError(Fault(file=str(path), message=f"not a truth that was sealed: {e}")) from None
-    got = digest(truths, salt)
+        if not isinstance(found, dict) or found.get("format") != TRUTH_FORMAT:
+            raise ValueError(f"format {TRUTH_FORMAT!r} is missing")
+        truths, salt = found.get("truths"), found.get("salt")
+        if not isinstance(truths, list) or not isinstance(salt, str):
+            raise ValueError("truths or salt are missing")
+        got = digest(truths, salt)
     if got != shown:
         raise InputError(Fault(file=str(path), message=f"not the truth that was sealed, got {got}; {shown} was shown"))
     return truths

@@ -213,6 +213,19 @@ def test_another_truth_and_changed_recordings_are_refused(cases: Path, tmp_path:
     (tmp_path / "t.json").write_text(json.dumps(truth))
     done = scored(cases, answers, tmp_path / "a", "--truth", tmp_path / "t.json")
     assert (done.exit_code, "not the truth that was sealed" in done.stderr) == (2, True)
+    for text in (
+        "",
+        "[]",
+        "{",
+        '{"format": "rollover-truths/1"}',
+        truth_of(cases).read_text().replace("0.", "NaN, 0.", 1),
+    ):
+        (tmp_path / "t.json").write_text(text)
+        done = scored(cases, answers, tmp_path / "a", "--truth", tmp_path / "t.json")
+        assert (done.exit_code, "t.json: not a" in done.stderr or "t.json: not the" in done.stderr) == (2, True), text
+        assert "; " in done.stderr
+    missing = scored(cases, answers, tmp_path / "a", "--truth", tmp_path / "none.json")
+    assert (missing.exit_code, "none.json: not a readable truth" in missing.stderr) == (2, True)
     copy = tmp_path / "copy"
     shutil.copytree(cases, copy)
     (copy / "case-0002" / "r1.yaml").write_text("format: rollover-recording/1\n")

@@ -126,8 +126,8 @@ def prove(
     with results.whole(out) as part:
         results.write_json(part / JSON, account)
         results.write_json(part / SEAL, proof.seal.public())
-        truth = {"salt": proof.seal.salt, "truths": proof.truths}
-        (part / TRUTH).write_text(json.dumps({"format": "rollover-truths/1", **truth}, indent=1), encoding="utf-8")
+        opened = {"format": "rollover-truths/1", "salt": proof.seal.salt, "truths": proof.truths}
+        (part / TRUTH).write_text(json.dumps(opened, indent=1), encoding="utf-8")
         lines = (json.dumps(results.plain({"case": name, **found})) for name, found in proof.diagnoses.items())
         (part / DIAGNOSES).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
         from viz.pages.proof import page

@@ -38,8 +38,11 @@ def drawn(problem: Problem, fitted: Fitted, count: int, seed: int = 0) -> Draws:
             left += found.total - g * g / there.weight
         return -0.5 * left / dispersion
 
-    made = sampled(log_density, np.array(fitted.x), dispersion * np.linalg.inv(A), draws=count, seed=seed)
-    names, units, marked = [], [], []
+    covariance: Array = np.asarray(dispersion * np.linalg.inv(A), dtype=np.float64)
+    made = sampled(log_density, np.array(fitted.x), covariance, draws=count, seed=seed)
+    names: list[str] = []
+    units: list[str] = []
+    marked: list[float] = []
     each = list(with_slices(fitted.candidates))
     for c, own in each:
         place = ".".join([c.id, *([c.channel] if c.channel else [])])
