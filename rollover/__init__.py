@@ -300,9 +300,8 @@ def diagnose(
     reference
         Names of recordings of the same rig in which nothing is suspected: they teach that share.
     estimate
-        Estimate that share where nothing explains the recordings beside their noise, and diagnose again beside it: in
-        place of "unexplained" alone, where no share is stated; True: whatever is stated, and what that makes doubtful
-        is not named either; False: never.
+        Estimate that share where noise alone explains nothing, and diagnose again beside it: in place of "unexplained"
+        alone, where none is stated; True: whatever is stated or made doubtful by it; False: never.
     workers
         Child processes that fit at once; the answer is the same.
 
