@@ -36,8 +36,8 @@ from rollover.scenario import load
 DROPS = 6  # of each case
 PLANNED = 1800  # cases, of which the first are taken: those of fewer cases begin those of more
 WAYS: dict[str, dict[str, Any]] = {
-    "nothing stated": {},
-    "--second-opinion": {"estimate": "unexplained"},
+    "--no-estimate": {"estimate": False},
+    "--second-opinion": {"estimate": "unexplained"},  # as with nothing stated
     "--estimate": {"estimate": True},
     "--tolerance 0.05": {"tolerance": 0.05},
 }

@@ -73,7 +73,7 @@ def predicted_by_others(
 
 def _courses(problem: Problem, fitted: Fitted) -> list[Mapping[str, Course]]:
     """Courses by channel of each recording."""
-    found = []
+    found: list[Mapping[str, Course]] = []
     for e, block, residual in zip(problem.dataset, fitted.blocks, problem.residuals(fitted), strict=True):
         own = {}
         for s, part in e.spans():
