@@ -104,7 +104,8 @@ def noise_floor(values: Array, order: int | None = None, strides: Sequence[int] 
 
 def _rounding(values: Array) -> float:
     """Variance below which residuals are the arithmetic's own."""
-    return float((64.0 * np.finfo(float).eps * np.max(np.abs(values))) ** 2)
+    with np.errstate(over="ignore"):  # beyond 1e167 no variance is a number: all of it is rounding
+        return float((64.0 * np.finfo(float).eps * np.max(np.abs(values))) ** 2)
 
 
 @functools.cache

@@ -117,6 +117,7 @@ DECLARED: dict[str, tuple[dict[str, Any], str]] = {
     "a logarithm of nothing": ({"parameters": {"slope": replace(GOOD, scale="log")}}, "no logarithm, got 0"),
     "a null of what is always fitted": ({"parameters": {"slope": replace(GOOD, null=0.0)}}, "a null is a term's"),
     "not a number": ({"parameters": {"slope": replace(GOOD, high=float("inf"))}}, "not a finite number, got inf"),
+    "no number": ({"parameters": {"slope": replace(GOOD, low=None)}}, "slope.low: not a finite number, got None"),  # type: ignore[arg-type]
     "a number beyond all": ({"parameters": {"slope": replace(GOOD, high=10**400)}}, "not a finite number, got 1000"),
     "a channel without a name": ({"inputs": {None: Line.inputs[IN]}}, "a name that is no text, got None"),
     "a unit that is none": ({"outputs": {OUT: Quantity(3.0)}}, f"{OUT}.unit: no text, got 3.0"),  # type: ignore[arg-type]

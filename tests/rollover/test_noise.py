@@ -75,3 +75,9 @@ def test_a_smooth_signal_has_none() -> None:
 def test_too_few_samples() -> None:
     with pytest.raises(ValueError, match="too few for a noise floor, got 20"):
         noise_floor(np.zeros(20))
+
+
+@pytest.mark.filterwarnings("error")
+def test_values_whose_squares_are_no_numbers_have_none() -> None:
+    values = np.where(np.arange(200) == 100, 1e308, 0.0)
+    assert noise_floor(values).sigma == 0.0

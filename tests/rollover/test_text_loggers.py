@@ -304,3 +304,9 @@ def test_blank_lines_are_no_samples_that_a_rate_may_count(tmp_path: Path, blank:
         read(tmp_path, "a.csv", f"F\n1\n2\n{blank}3\n4\n", channels, more="rate: 10\n")
     for text in (f"F\n1\n2\n3\n{blank}", f"F\n{blank}1\n2\n3\n", "F\n\n1\n\n2\n\n3\n", "F\n1\n# then\n2\n3\n"):
         assert read(tmp_path, "a.csv", text, channels, more="rate: 10\n")[FORCE].tolist() == [1, 2, 3]
+
+
+@pytest.mark.parametrize("name", ["utf-9", "\\u202e\\0", ""])
+def test_an_encoding_that_is_none_is_refused_with_its_cure(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match=r"encoding: unknown, got .*; such as utf-8, cp1252, utf-16"):
+        read(tmp_path, "v.txt", TABBED, TIME_AND_X, f'encoding: "{name}"')

@@ -252,9 +252,7 @@ def _wrong_parameter(path: str, name: object, p: object, *, is_always: bool) -> 
         return
     if not isinstance(name, str) or not NAME.fullmatch(name) or hasattr(Effect, name):
         yield path, f"not to be used as a name, got {name!r}; letters, digits and '_', no word that effects use"
-    numbers = {
-        n: v for n, v in (("low", p.low), ("high", p.high), ("start", p.start), ("null", p.null)) if v is not None
-    }
+    numbers = {"low": p.low, "high": p.high, "start": p.start} | ({} if p.null is None else {"null": p.null})
     bad = {n: v for n, v in numbers.items() if not is_finite_number(v)}
     for n, v in bad.items():
         yield f"{path}.{n}", f"not a finite number, got {v!r}; a number in {p.unit} is needed"

@@ -99,7 +99,7 @@ class Csv:
             raise ValueError(f"delimiter: {message}")
         try:
             codecs.lookup(self.encoding)
-        except LookupError:
+        except (LookupError, ValueError):  # the second of a name with a null character
             raise ValueError(f"encoding: unknown, got {self.encoding!r}; such as utf-8, cp1252, utf-16") from None
         names = 1 if self.names_row is None else self.names_row
         if names < 0:
