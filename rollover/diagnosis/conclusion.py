@@ -194,13 +194,13 @@ def weighed(
         alone = by_first_effect(problem, explanation, nothing, phases)
         explanation, verdict = decide(alone)
         named_so = name_all(explanation, verdict)
-    while more := rejected_effects(problem, named_so[0], named_so[1], groups) - nothing:
+    while more := rejected_effects(problem, *named_so[:2], groups, in_doubt=asked.estimates) - nothing:
         nothing |= more
         problem.with_noise_model(held)
         explanation, verdict = decide(next_best(problem, explanation, nothing, groups, phases))
         named_so = name_all(explanation, verdict)
     explanation, effects, validation = named_so
-    effects = clear_of_null(problem, explanation, effects)
+    effects = clear_of_null(problem, explanation, effects) if asked.estimates else effects
     found = list(problem.dataset)
     # beside a discrepancy what is met is no more than that and noise: what is surely predicted all the same is more
     is_open = asked.estimates and verdict == "unexplained" and not is_beside

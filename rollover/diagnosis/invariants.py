@@ -36,13 +36,18 @@ def at_bounds(effects: Sequence[Named]) -> set[str]:
     }
 
 
-def rejected_effects(problem: Problem, found: Explanation, effects: Sequence[Named], groups: Groups) -> set[str]:
-    """Ids of effects that are no finding: at a bound, maybe null, or predicting worse than nothing does.
+def rejected_effects(
+    problem: Problem, found: Explanation, effects: Sequence[Named], groups: Groups, *, in_doubt: bool
+) -> set[str]:
+    """Ids of effects that are no finding: predicting no better than nothing does or, where `in_doubt`, maybe null.
 
-    Of an effect alone the misfit itself is asked whether it may be null, slopes only of one beside others.
+    An effect at a bound is in doubt too. Of an effect alone the misfit itself is asked whether it may be null, slopes
+    only of one beside others.
     """
     if effects and held_out(found.fitted, groups).total >= held_out(found.base, groups).total:
         return {e.id for e in effects}
+    if not in_doubt:
+        return set()
     null = {e.id for e in effects if may_be_null(e)}
     if len(effects) == 1 and null and is_clear_of_null(problem, found.fitted):
         null = set()
