@@ -135,7 +135,7 @@ def test_drops_share_what_their_conditions_leave_as_it_is() -> None:
     assert one.tolist() != DropModel(scenario=own).kernel_law[1].tolist()
 
 
-def test_a_scenario_under_conditions_is_made_once_for_the_same_alone() -> None:
+def test_a_scenario_under_conditions_is_made_once() -> None:
     base = scenario()
     ((_, asked),) = recorded({}, speeds=(2.0,))
     assert asked.conditions == {"initiation.speed": 2.0}

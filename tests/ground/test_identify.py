@@ -17,7 +17,7 @@ from tests.ground.recorded_drops import SPEEDS, TRUTH, recorded
 from tests.ground.reference_drop import solve
 
 
-def test_drops_whose_second_branch_begins_at_once_are_refused_in_words() -> None:
+def test_a_second_branch_that_begins_at_once_is_refused() -> None:
     """A force that leaps where a hard layer begins: trial steps of the fit go beyond what a number holds."""
     import rollover as ro
 

@@ -127,7 +127,7 @@ def test_an_effect_at_its_null_leaves_feet_as_they_are(effect) -> None:
     assert null.applied().vehicle == base.vehicle
 
 
-def test_what_a_test_says_of_a_foot_takes_the_place_of_its_section(tmp_path) -> None:
+def test_a_foot_s_stated_values_go_before_its_section(tmp_path) -> None:
     file = tmp_path / "frame.yaml"
     text = FILE.read_text()
     file.write_text(text.replace(RIGHT, RIGHT[:-1] + ", side_stiffness: 2.0e5, side_yield: 15.0e3, play: 0.002}"))

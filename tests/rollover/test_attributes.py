@@ -53,7 +53,7 @@ def matrix(path: Path, **attributes: Any) -> Recording:
     "key",
     ["gain", "CalFactor", "LSB", "Coefficients", "conversion_factor", "volts_per_count", "Multiplier", "sensitivity"],
 )
-def test_whole_numbers_beside_a_scale_of_no_convention_are_refused(tmp_path: Path, key: str) -> None:
+def test_whole_numbers_beside_an_unknown_scale_are_refused(tmp_path: Path, key: str) -> None:
     value = [0.0, 0.5] if key == "Coefficients" else 0.5
     with pytest.raises(InputError, match=rf"channels.run/F: whole numbers beside {key} .*0.5, which no convention"):
         grouped(tmp_path / "a.h5", {key: value})

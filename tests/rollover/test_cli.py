@@ -66,13 +66,15 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Bench:
     monkeypatch.setattr("ground.compiled.is_warm", lambda *_: True)
     log, report = types.ModuleType("viz.recordings.log"), types.ModuleType("viz.pages.report")
     log.write_rrd = lambda run, path, peaks: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
-    report.page = lambda run, peaks, answer, rows, command: f"<p>{command}</p>"  # type: ignore[attr-defined]
+    report.page = lambda run, peaks, answer, rows, command, near: f"<p>{command}</p>"  # type: ignore[attr-defined]
     for module in (log, report):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr(assessed, "peak_loads", bench.peak_loads)
     for place in (assessed, loads):
         monkeypatch.setattr(place, "unconverged", lambda peaks: bench.unconverged)
-    monkeypatch.setattr(assessed, "criteria", lambda run: bench.rows.pop(0) if len(bench.rows) > 1 else bench.rows[0])
+    monkeypatch.setattr(
+        assessed, "criteria", lambda run, near=(): bench.rows.pop(0) if len(bench.rows) > 1 else bench.rows[0]
+    )
     monkeypatch.setattr(viz.recordings, "log", log, raising=False)
     monkeypatch.setattr(viz.pages, "report", report, raising=False)
     return bench

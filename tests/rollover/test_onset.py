@@ -125,7 +125,7 @@ def test_a_clearly_wrong_clock_is_set_though_stated_known(late: float) -> None:
 @pytest.mark.parametrize(
     "lacks", ["effects.soil-viscous-damping.damping", "effects.soil-stiffness.scale", "effects.soil-crust.thickness"]
 )
-def test_a_clearly_wrong_clock_is_set_beside_what_the_scenario_lacks(late: float, lacks: str) -> None:
+def test_a_wrong_clock_is_set_beside_what_is_left_out(late: float, lacks: str) -> None:
     """The whole drop is hardly nearer on the right clock: what it says before and about its contact is."""
     value = {"effects.soil-viscous-damping.damping": 250.0, "effects.soil-stiffness.scale": 2.0}.get(lacks, 0.05)
     more = {"effects.soil-crust.stiffness_ratio": 3.0} if "crust" in lacks else {}

@@ -75,7 +75,7 @@ def test_a_date_missing_among_dates_and_a_number_are_refused(tmp_path: Path) -> 
             read(tmp_path, table([MIDNIGHT, other, MIDNIGHT + MS]))
 
 
-def test_rows_of_names_units_and_numbers_are_the_programs_own_numbers(tmp_path: Path) -> None:
+def test_rows_of_names_and_units_are_the_sheet_s_own_numbers(tmp_path: Path) -> None:
     rows = [["Report 17", 5.0], [None], ["t", "F"], ["s", "kN"], [None], *([0.1 * k, float(k)] for k in range(4))]
     how = {"t": "time", "F": FORCE}
     found = read(tmp_path, rows, "csv: {names_row: 3, units_row: 4}\n", **how)

@@ -298,7 +298,8 @@ def _ledger(run: Run) -> list[str]:
     if not run.ledger:
         return []
     residual, closed = run.ledger.get("residual", math.nan), closure(run)
-    judged = f", {100.0 * closed.end:.2g} % of the {joules(run.released)} released" if math.isfinite(closed.end) else ""
+    share = abs(residual) / run.released if run.released > 0.0 else math.nan
+    judged = f", {100.0 * share:.2g} % of the {joules(run.released)} released" if math.isfinite(closed.end) else ""
     names = [name for name, value in run.ledger.items() if name != "residual" and value]
     lines = [f"**Energy:** {joules(residual)} unaccounted for{judged}.", ""]
     if closed.is_wide:

@@ -281,7 +281,8 @@ def _ledger(run: Run) -> list[Block]:
     values = {name: 1e-3 * value for name, value in run.ledger.items() if known(value)}
     residual = run.ledger.get("residual", float("nan"))
     closed = closure(run)
-    share = f", {_percent(closed.end)} of the {joules(run.released)} released" if math.isfinite(closed.end) else ""
+    of_all = _percent(abs(residual) / run.released) if math.isfinite(closed.end) else ""
+    share = f", {of_all} of the {joules(run.released)} released" if of_all else ""
     svg = plots.bars(values, label="energy at the end, kJ", roles={"residual": "limit"})
     caption = f"The energy ledger at the end of the run: {joules(residual)} unaccounted for{share}."
     blocks: list[Block] = [Figure(svg=svg, caption=caption)]

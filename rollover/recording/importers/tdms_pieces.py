@@ -44,12 +44,14 @@ def pieces_of(nptdms: Any, path: Path) -> Pieces:
             written = any(self.counts.values())
             for name, properties in (segment_object_properties or {}).items():
                 known = self._get_or_create_object(name).properties
+                # what holds no data is of all that was written; a channel that begins here has nothing before it
+                before = self.counts.get(name, 0 if name in self.object_metadata else 1)
                 for key, value in properties:
                     is_same = key in known and bool(known[key] == value)  # many writers repeat what holds still
                     if key == START and not is_same:
                         said, at = starts.setdefault(name, []), self.counts.get(name, 0)
                         said[:] = [*(one for one in said if one[0] != at), (at, value)]
-                    is_new = written and self.counts.get(name, 1) > 0 and not is_same
+                    is_new = written and before > 0 and not is_same
                     if is_new and (key in MATTERS or key.startswith(SCALES)):
                         changed.setdefault(name, f"{key} changes within the file, got {known.get(key)} and {value}")
             super()._update_object_properties(segment_object_properties)
