@@ -288,7 +288,7 @@ def test_the_slope_study_s_largest_difference_is_within_scatter(tmp_path: Path) 
     beside = check["neighbours"]
     assert {one["name"] for one in beside["responses"]} == {n for n, v in by_name.items() if v > reference.LARGE}
     assert all(one["within"] for one in beside["responses"]), beside
-    assert len(case_store.on_shelf(tmp_path)) == 2 + 4  # the case, Exudyn's, and four neighbours
+    assert len(case_store.stored_keys(tmp_path)) == 2 + 4  # the case, Exudyn's, and four neighbours
 
 
 def test_the_check_s_limit_is_student_s() -> None:
