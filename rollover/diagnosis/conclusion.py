@@ -20,6 +20,7 @@ from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.grades import graded, with_shares
 from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
+from rollover.diagnosis.inference.condition_pulls import pull_notes
 from rollover.diagnosis.inference.discrepancy import Discrepancy
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.inference.recording_faults import RecordingFault, intrinsic_faults, misread, truncation_fault
@@ -228,6 +229,7 @@ def weighed(
     if shown is not None:
         verdict, effects = shown.verdict, shown.effects
         explanation = explanation.refused()
+    notes += pull_notes(problem, explanation.fitted)
     return Conclusion(
         asked=asked,
         problem=problem,

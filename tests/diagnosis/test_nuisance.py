@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.condition_uncertainty import marginalised, nuisance_parameters
+from rollover.diagnosis.data.condition_uncertainty import marginalised, nuisance_parameters, pulls
 from rollover.diagnosis.data.dataset import Dataset, condition_groups, dataset_of, left_out, with_uncertain_conditions
 from rollover.diagnosis.data.repeatability import with_scatter
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import coordinate
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.forward_model import set_up, simulator_of
+from rollover.diagnosis.inference.condition_pulls import mean_pulls, pull_notes
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Clock, Recording
@@ -190,6 +191,32 @@ def test_a_doubt_acts_beside_what_was_found_as_it_does_there() -> None:
     assert named.id == "structural-compliance"
     assert named.parameters["stiffness"].low < 7000.0 < named.parameters["stiffness"].high
     assert named.parameters["stiffness"].high < 1.15 * named.parameters["stiffness"].low
+
+
+@pytest.mark.parametrize(("off", "note"), [(1.04, "mismatch: vehicle.mass by +1."), (1.0, "")])
+def test_what_takes_up_the_mismatch_is_said_with_its_pull(off: float, note: str) -> None:
+    """A striker by twice its stated uncertainty heavier, and one as stated; clocks that are free take up a little of it."""
+    mass = scenario().vehicle.mass
+    found = [
+        (name, replace(r, uncertainty={"vehicle.mass": 0.02 * mass}))
+        for name, r in recorded({"vehicle.mass": off * mass}, 1, speeds=SPEEDS)
+    ]
+    problem = Problem(dataset(found))
+    align(problem)
+    base = problem.fit((), ())
+    assert base is not None
+    assert mean_pulls(problem, base)["vehicle.mass"] == pytest.approx((off - 1.0) / 0.02, abs=0.2)
+    said = pull_notes(problem, base)
+    assert (note in said[0]) if note else said == []
+
+
+def test_pulls_are_means_of_a_linear_model() -> None:
+    # one column of length 3, misfit along it by 2: (9 + k) z = 3 . 6 with z = 2 . 9/(9 + k)
+    column = np.array([[3.0], [0.0]])
+    for k in (1.0, 5.0):
+        assert pulls(column, np.array([6.0, 1.0]), k) == pytest.approx([18.0 / (9.0 + k)], rel=1e-12)
+    freed = marginalised(column)(np.array([6.0, 1.0]))
+    assert marginalised(column).undone(freed) == pytest.approx([6.0, 1.0], rel=1e-12)
 
 
 def test_shapes_are_looked_for_where_they_have_a_part() -> None:

@@ -41,6 +41,24 @@ class Marginalised:
         inside = self.shares[:, None] * (self.directions.T @ values.reshape(values.shape[0], -1))
         return np.asarray(values - (self.directions @ inside).reshape(values.shape))
 
+    def undone(self, values: Array) -> Array:
+        """The whitened misfit (n,) that was freed of them."""
+        inside = (1.0 / (1.0 - self.shares) - 1.0) * (self.directions.T @ values)
+        return np.asarray(values + self.directions @ inside)
+
+
+def pulls(columns: Array, misfit: Array, samples_per_error: float) -> Array:
+    """How far a misfit pulls each condition from what is stated of it, in its standard deviations, (q,).
+
+    The mean of z given w = N z + e with z ~ N(0, 1), e of unit variance and k samples to an error:
+
+        z = (k 1 + N'N)^-1 N' w                                                                               (D22)
+
+    `columns` are N (n, q), `misfit` is w (n,), whitened and not freed of the conditions.
+    """
+    normal = columns.T @ columns + samples_per_error * np.eye(columns.shape[1])
+    return np.asarray(np.linalg.solve(normal, columns.T @ misfit))
+
 
 def marginalised(columns: Array) -> Marginalised:
     """From N (n, q), columns of what 1 sigma of each condition does."""

@@ -117,14 +117,19 @@ class Dataset:
     @cached_property
     def marginalised(self) -> Marginalised:
         """What takes the uncertain conditions, and zeros, out of a whitened misfit."""
+        return marginalised(self.uncertain)
+
+    @cached_property
+    def uncertain(self) -> Array:
+        """What one standard deviation of each uncertain condition, then of each zero, does whitened, (n, q)."""
         columns = [] if self.nuisance is None else list(self.nuisance.T)
         for s, part in self.spans():
             if s.zero_error > 0.0:
                 columns.append(np.zeros(self.count))
                 columns[-1][part] = s.zero_error
         if not columns:
-            return marginalised(np.zeros((self.count, 0)))
-        return marginalised(np.stack([self.whitened(column) for column in columns], axis=1))
+            return np.zeros((self.count, 0))
+        return np.stack([self.whitened(column) for column in columns], axis=1)
 
     @cached_property
     def expected(self) -> float | None:

@@ -35,6 +35,13 @@ class CoarseSampling:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ConditionPulls:
+    """How far recordings pull what is stated of their conditions."""
+
+    least_pull: float = 1.0  # standard deviations: less is what the statement itself expects of two in three
+
+
+@dataclass(frozen=True, kw_only=True)
 class Discrepancy:
     """Prior of a model's discrepancy."""
 
@@ -203,6 +210,7 @@ class Inference:
     chassis: Chassis = Chassis()  # rates of the chassis
     clipping: Clipping = Clipping()  # sensors that are clipped
     coarse_sampling: CoarseSampling = CoarseSampling()  # coarse digits
+    condition_pulls: ConditionPulls = ConditionPulls()  # pulls of stated conditions
     discrepancy: Discrepancy = Discrepancy()  # prior of a model's discrepancy
     drop_dependence: DropDependence = DropDependence()  # what a mismatch of drops depends on
     intervals: Intervals = Intervals()  # intervals of parameters
