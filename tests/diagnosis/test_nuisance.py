@@ -195,7 +195,7 @@ def test_a_doubt_acts_beside_what_was_found_as_it_does_there() -> None:
 
 @pytest.mark.parametrize(("off", "note"), [(1.04, "mismatch: vehicle.mass by +1."), (1.0, "")])
 def test_what_takes_up_the_mismatch_is_said_with_its_pull(off: float, note: str) -> None:
-    """A striker by twice its stated uncertainty heavier, and one as stated; clocks that are free take up a little of it."""
+    """A striker by twice its stated uncertainty heavier, and one as stated; free clocks take up a little of it."""
     mass = scenario().vehicle.mass
     found = [
         (name, replace(r, uncertainty={"vehicle.mass": 0.02 * mass}))
