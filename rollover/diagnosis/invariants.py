@@ -39,15 +39,18 @@ def at_bounds(effects: Sequence[Named]) -> set[str]:
 def rejected_effects(
     problem: Problem, found: Explanation, effects: Sequence[Named], groups: Groups, *, in_doubt: bool
 ) -> set[str]:
-    """Ids of effects that are no finding: predicting no better than nothing does or, where `in_doubt`, maybe null.
+    """Ids of effects that are no finding: predicting no better than nothing does, or at a bound and worse than a rival.
 
-    An effect at a bound is in doubt too. Of an effect alone the misfit itself is asked whether it may be null, slopes
-    only of one beside others.
+    Where `in_doubt`, all that are at a bound or maybe null. Of an effect alone the misfit itself is asked whether it
+    may be null, slopes only of one beside others.
     """
-    if effects and held_out(found.fitted, groups).total >= held_out(found.base, groups).total:
+    after = held_out(found.fitted, groups)
+    if effects and after.total >= held_out(found.base, groups).total:
         return {e.id for e in effects}
     if not in_doubt:
-        return set()
+        left, rivals = float(after.left.sum()), found.first.rivals if found.first is not None else ()
+        better = any(not ends_at_bound(f) and float(held_out(f, groups).left.sum()) < left for f in rivals)
+        return at_bounds(effects) if better else set()
     null = {e.id for e in effects if may_be_null(e)}
     if len(effects) == 1 and null and is_clear_of_null(problem, found.fitted):
         null = set()

@@ -127,6 +127,8 @@ NAMED = {
     "whiffle balls, one held out": "air-drag",
     "volleyball": "air-drag",
     "cones, firm spring, 60 deg": "structural-compliance",
+    "tennis-ball": "air-drag",
+    "cones, rigid, 45 deg": "soil-added-mass-growth",
     "cube tosses, 0 to 4": "ground-friction",
     "cube tosses, 5 to 9": "ground-friction",
 }
@@ -163,11 +165,6 @@ def test_the_reported_spring_covers_the_authors_value() -> None:
 def test_the_written_friction_covers_what_is_published(name: str) -> None:
     _, low, high = written(name)["effects"][0]["parameters"]["coefficient"]
     assert low < 0.165 < high  # 0.15 to 0.18
-
-
-def test_rigid_cones_missing_effect_is_in_the_confusion_set() -> None:
-    found = written("cones, rigid, 45 deg")["effects"][0]
-    assert "soil-added-mass-growth" in (found["id"], *found["indistinguishable_from"])
 
 
 @pytest.mark.parametrize("name", ["baseball", "golf-ball", "penetrometer"])
