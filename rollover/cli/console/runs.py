@@ -158,7 +158,8 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
             out.print(f"{a.scenario}: {note}", style="yellow", soft_wrap=True)  # a command is copied as it stands
     bad = sum(not a.ok for a in answers)
     updated = sum(a.verdict == "updated" for a in answers)
-    verdict = f"{updated} baselines written" if updated else f"{bad} of {len(answers)} scenarios are not as they were"
+    written = "1 baseline written" if updated == 1 else f"{updated} baselines written"
+    verdict = written if updated else f"{bad} of {len(answers)} scenarios are not as they were"
     if not bad and not updated:
         verdict = f"all {len(answers)} scenarios are as they were" if len(answers) != 1 else "the scenario is as it was"
     out.print(f"{verdict[0].upper()}{verdict[1:]}. Everything: {folder}", style="bold")
