@@ -20,6 +20,7 @@ from rollover.system.boundary import reading
 from rollover.system.errors import Fault, InputError
 
 SEAL, TRUTH = "seal.json", "truth.json"
+PRIVATE = 0o600  # of a truth: for its owner
 CURE = "the file that `rollover prove` wrote is needed"
 SEAL_FORMAT, TRUTH_FORMAT = "rollover-seal/1", "rollover-truths/1"
 
@@ -61,7 +62,7 @@ def write_truth(
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / name
     content = {"format": TRUTH_FORMAT, "salt": seal.salt, **({"asked": asked} if asked else {}), "truths": list(truths)}
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, PRIVATE)
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         json.dump(content, file, indent=1, allow_nan=False)
         file.write("\n")

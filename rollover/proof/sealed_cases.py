@@ -81,6 +81,12 @@ def read_sealed(folder: Path) -> Sealed:
     return Sealed(folder=folder, seal=seal, cases=cases, candidates=known)
 
 
+def truth_beside(folder: Path) -> Path:
+    """Where the truth of a folder of cases stands unless another place is named: beside it."""
+    whole = folder.resolve()
+    return whole.parent / f"{whole.name}-truth.json"
+
+
 def truths_of(given: Sealed, path: Path) -> list[dict[str, Any]]:
     """The truth of sealed cases, in their order. Raises `InputError` for another one."""
     truths = opened(given.digest, path)

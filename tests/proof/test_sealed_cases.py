@@ -235,6 +235,21 @@ def test_another_truth_and_changed_recordings_are_refused(cases: Path, tmp_path:
     assert (done.exit_code, "no sealed cases: it is missing" in done.stderr) == (2, True)
 
 
+def test_the_folder_one_is_in_has_its_truth_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mine").mkdir()
+    monkeypatch.chdir(tmp_path / "mine")
+    done = call("prove", "--cases", "1", "--kinds", "null", "--workers", "0", "--export", ".")
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "mine" / "case-0001").is_dir()
+    assert stat.S_IMODE((tmp_path / "mine-truth.json").stat().st_mode) == 0o600
+    said = {"format": "rollover-answers/1", "answers": [{"case": "case-0001", "verdict": "no-mismatch"}]}
+    monkeypatch.chdir(tmp_path / "mine")  # the folder was exchanged for another one
+    said["seal"] = json.loads(Path("seal.json").read_text())["digest"]
+    (tmp_path / "a.json").write_text(json.dumps(said))
+    scored = call("score", ".", tmp_path / "a.json", "--out", tmp_path / "out")
+    assert scored.exit_code == 0, scored.output
+
+
 def test_neither_folder_nor_truth_is_written_over(cases: Path, tmp_path: Path) -> None:
     again = call("prove", *ASKED, "--export", cases)
     assert (again.exit_code, "exists; --force replaces it" in again.stderr) == (2, True)

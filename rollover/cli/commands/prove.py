@@ -80,6 +80,8 @@ def prove(
     if export is None and truth is not None:
         raise InputError(Fault(file="--truth", message=f"without --export, got {truth}; --export DIR beside it"))
     if export is not None:
+        from rollover.proof.sealed_cases import truth_beside
+
         write_sealed_cases(
             Order(
                 cases=cases,
@@ -91,7 +93,7 @@ def prove(
                 workers=workers,
             ),
             export,
-            truth or export.with_name(f"{export.name}-truth.json"),
+            truth or truth_beside(export),
             force=force,
             as_json=as_json,
         )

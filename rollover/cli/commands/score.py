@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rollover.cli.commands.common import AsJson, Force, answering, app, manual
+from rollover.cli.commands.common import AsJson, Force, answering, app, hand_out, manual
 from rollover.cli.commands.prove import sentences
 
 JSON, PAGE = "score.json", "report.html"
@@ -36,22 +35,16 @@ def score(
     from rollover.assessment import results
     from rollover.cli import console
     from rollover.proof.answers import SCORE_FORMAT, read_answers, scored
-    from rollover.proof.sealed_cases import read_sealed
+    from rollover.proof.sealed_cases import read_sealed, truth_beside
     from viz.pages.proof import page
 
     given = read_sealed(cases)
     found = read_answers(answers, given)
-    opened = truth or cases.resolve().with_name(f"{cases.resolve().name}-truth.json")
-    answer = {**scored(found, given, opened), "versions": results.versions()}
+    answer = results.plain({**scored(found, given, truth or truth_beside(cases)), "versions": results.versions()})
     folder = out or Path("out", "score", answers.stem)
     about = {"by": found.by, "seal": answer["seal"]}
     results.claim_account(folder, SCORE_FORMAT, about, (JSON, PAGE), force=force)
     words = ["rollover", "score", str(cases), str(answers), *(["--truth", str(truth)] if truth else [])]
     text = page(answer, command=" ".join(map(shlex.quote, words)), versions=answer["versions"])
-    with results.whole(folder) as part:
-        results.write_json(part / JSON, answer)
-        (part / PAGE).write_text(text, encoding="utf-8")
-    if as_json:
-        print(json.dumps(results.plain(answer), indent=2))
-    else:
-        console.tell("\n".join([*sentences(answer["summary"]), f"Written to {folder}"]))
+    said = "\n".join([*sentences(answer["summary"]), f"Written to {folder}"])
+    hand_out(answer, text, folder, (JSON, PAGE), as_json=as_json, show=lambda: console.tell(said))

@@ -10,7 +10,6 @@ from pathlib import Path
 from rollover.system.errors import Fault, InputError
 
 LARGEST = 2**31  # of a seed that is drawn, so that it can be typed
-PRIVATE = 0o600  # of the truth: for its owner
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +31,7 @@ def write_sealed_cases(order: Order, folder: Path, truth: Path, *, force: bool, 
     from rollover.cli import catalogue, console
     from rollover.cli.templates import of_sealed_cases
     from rollover.proof import sealed_cases
-    from rollover.proof.commitment import SEAL, write_truth
+    from rollover.proof.commitment import PRIVATE, SEAL, write_truth
     from rollover.system.writing import check_free, hold, staged
 
     names = [sealed_cases.LIST, sealed_cases.CANDIDATES, SEAL, *of_sealed_cases(0, "", "")]
@@ -46,7 +45,7 @@ def write_sealed_cases(order: Order, folder: Path, truth: Path, *, force: bool, 
     check_free(truth, force=force)
     hold(truth)
     seed = secrets.randbelow(LARGEST) if order.seed is None else order.seed
-    asked = {**asdict(order), "seed": seed}
+    asked = {name: value for name, value in asdict(order).items() if name != "workers"} | {"seed": seed}
     with results.whole(folder) as part:
         try:
             made = sealed_cases.export(
@@ -68,11 +67,10 @@ def write_sealed_cases(order: Order, folder: Path, truth: Path, *, force: bool, 
         results.write_json(part / SEAL, made.seal.public())
         for name, text in of_sealed_cases(order.cases, order.rig, made.seal.digest).items():
             (part / name).write_text(text, encoding="utf-8")
-        del asked["workers"]
         truth.parent.mkdir(parents=True, exist_ok=True)
         kept = staged(truth, lambda at: write_truth(made.truths, made.seal, at.parent, at.name, asked))
+    kept.chmod(PRIVATE)  # before anybody sees it
     kept.replace(truth)
-    truth.chmod(PRIVATE)
     if as_json:
         print(json.dumps({**made.account, "seal": made.seal.public(), "truth": str(truth)}, indent=2))
     else:
