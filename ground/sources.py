@@ -14,8 +14,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-OWN = ("ground", "rollover")
-DIGITS = 16
+OWN = ("ground", "rollover")  # packages whose code kernels may hold; all else is a library
+DIGITS = 16  # 64 bits: no two of some thousand folders have the same
 # a whole block under TYPE_CHECKING is there for the eye only
 _TYPES = re.compile(rb"^if (?:typing\.)?TYPE_CHECKING:[^\n]*\n(?:[ \t]+[^\n]*\n|[ \t]*\n)*", re.MULTILINE)
 _IMPORT = re.compile(

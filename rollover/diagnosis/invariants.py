@@ -44,8 +44,10 @@ def rejected_effects(
     Where `in_doubt`, all that are at a bound or maybe null. Of an effect alone the misfit itself is asked whether it
     may be null, slopes only of one beside others.
     """
+    if not effects:
+        return set()
     after = held_out(found.fitted, groups)
-    if effects and after.total >= held_out(found.base, groups).total:
+    if after.total >= held_out(found.base, groups).total:
         return {e.id for e in effects}
     if not in_doubt:
         left, rivals = float(after.left.sum()), found.first.rivals if found.first is not None else ()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 from pathlib import Path
@@ -14,6 +13,7 @@ from rollover.proof.score import score
 from rollover.proof.sealed_cases import Sealed, truths_of
 from rollover.proof.summary import tally
 from rollover.spec import document
+from rollover.system.arguments import is_finite_number
 from rollover.system.errors import Fault, InputError, hint
 
 FORMAT, SCORE_FORMAT = "rollover-answers/1", "rollover-score/1"
@@ -37,7 +37,7 @@ class Name:
             if not isinstance(given, Mapping) or "value" not in given or set(given) - set(KEYS):
                 raise ValueError(f"{at}: got {given!r}; {{value: 1.0}}, or {{value: 1.0, low: 0.9, high: 1.1}}")
             for key, value in given.items():
-                if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+                if not is_finite_number(value):
                     raise ValueError(f"{at}.{key}: not a number, got {value!r}; a finite one")
             if ("low" in given) != ("high" in given):
                 raise ValueError(f"{at}: one end of an interval, got {dict(given)!r}; `low` and `high`, or neither")

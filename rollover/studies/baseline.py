@@ -118,6 +118,11 @@ class Difference:
     same: bool
 
 
+def unchanged(count: int) -> str:
+    """That nothing has changed in so many scenarios, in words."""
+    return "the scenario is as it was" if count == 1 else f"all {count} scenarios are as they were"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Answer:
     """One scenario against its baseline. `same`, `excluded` and `updated` are good; all else is a failure."""

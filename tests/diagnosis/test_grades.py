@@ -46,7 +46,7 @@ def test_a_share_is_of_all_recordings_its_interval_jackknifed() -> None:
         found = jackknifed(due * rng.normal(0.7, 0.1, 6), due, [[k] for k in range(6)])
         covered += found.low <= 0.7 <= found.high
     assert 0.90 < covered / 300 < 0.99
-    # a channel that one drop alone drives to its end: of what the others leave nothing is told by it, nor against it
+    # a channel that one drop alone drives to its end: it says nothing for or against what the others leave
     one = jackknifed(
         np.array([80.0, 0.0, 0.2, -0.3, 0.0]), np.array([100.0, 1.0, 0.8, 1.2, 1.0]), [[k] for k in range(5)]
     )

@@ -205,8 +205,7 @@ def _posterior(c: Calibration, drawn: Posterior) -> list[Block]:
     """The draws pair by pair, and what they say of each value."""
     prior = "Prior: uniform between the bounds, of the logarithm where they are spaced logarithmically."
     names, units = [p.path for p in c.parameters], [p.unit for p in c.parameters]
-    blocks = open_values(names, units, c.draws, [e.value for e in c.estimates], drawn, prior)
-    return blocks[:3]  # what is to be said of walkers stands among the warnings
+    return open_values(names, units, c.draws, [e.value for e in c.estimates], drawn, prior)
 
 
 def _row(e: Estimate) -> list[str | Cell]:

@@ -12,7 +12,7 @@ from rollover.diagnosis.result import Place, Score
 from rollover.effects import effects
 from rollover.recording.checks import Finding
 from rollover.scenario import Scenario
-from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table
+from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table, as_sentence
 from viz.content.diagnosis_words import STATES, answer, label_of, named, predicted_as, ranked
 from viz.content.differences import differences_section
 from viz.content.entities import series
@@ -82,7 +82,8 @@ def _found(found: Diagnosis) -> list[Block]:
     if (d := found.posterior) is not None:
         prior = "Prior: uniform over the range of the search, of the logarithm where that is looked for."
         beside = Note(text="What a small error of the model would do is in the intervals above, not in the draws.")
-        blocks = [*open_values(d.names, d.units, d.values, d.fitted, d.convergence, prior), beside]
+        warnings = [Note(text=f"{as_sentence(w)}.", warning=True) for w in d.convergence.warnings]
+        blocks = [*open_values(d.names, d.units, d.values, d.fitted, d.convergence, prior), *warnings, beside]
         sections.append(Section(title="What stays open", blocks=blocks))
     return sections
 

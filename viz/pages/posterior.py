@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.calibration.posterior import Posterior
+from rollover.calibration.posterior import Posterior, summary
 from viz.content.blocks import Block, Cell, Figure, Note, Table
 from viz.figures.corner import corner
 
 COLUMNS = ("parameter", "mean", "deviation", "2.5 %", "median", "97.5 %", "R-hat", "steps worth one", "independent")
+NUMBERS = ("mean", "deviation", "low", "median", "high")
 
 
 def open_values(
@@ -28,16 +29,14 @@ def open_values(
         svg=corner(axes, values, fitted),
         caption="Draws of the posterior: 68 % and 95 % lie within the shades; lines are the fitted values.",
     )
-    rows: list[list[str | Cell]] = []
-    for k, name in enumerate(names):
-        low, median, high = np.quantile(values[:, k], [0.025, 0.5, 0.975])
-        numbers = (values[:, k].mean(), values[:, k].std(ddof=1), low, median, high)
-        each = drawn.r_hat[k], drawn.autocorrelation[k], drawn.effective[k]
-        agree = Cell(f"{each[0]:.3f}", "" if drawn.is_mixed else "warn")
-        rows.append([name, *(f"{v:.5g}" for v in numbers), agree, f"{each[1]:.2g}", f"{each[2]:.0f}"])
+    told, rows = summary(names, values, drawn, prior)["parameters"], list[list[str | Cell]]()
+    for name in names:
+        one = told[name]
+        agree = Cell(f"{one['r_hat']:.3f}", "" if drawn.is_mixed else "warn")
+        length = f"{one['autocorrelation_time']:.2g}", f"{one['effective_draws']:.0f}"
+        rows.append([name, *(f"{one[key]:.5g}" for key in NUMBERS), agree, *length])
     text = (
         f"{len(values)} draws by {drawn.sampler}: {drawn.walkers} walkers, {drawn.steps} steps after {drawn.warm_up}, "
         f"{drawn.acceptance:.0%} of the jumps accepted. {prior} The draws are posterior.csv."
     )
-    warnings: list[Block] = [Note(text=f"{w[:1].upper()}{w[1:]}.", warning=True) for w in drawn.warnings]
-    return [figure, Table(columns=COLUMNS, rows=rows, numeric=range(1, 9)), Note(text=text), *warnings]
+    return [figure, Table(columns=COLUMNS, rows=rows, numeric=range(1, 9)), Note(text=text)]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rollover.assessment.results import versions
-from rollover.studies.baseline import Answer, Difference
-from viz.content.blocks import Block, Cell, Details, Footer, Headline, Note, Section, Table
+from rollover.studies.baseline import Answer, Difference, unchanged
+from viz.content.blocks import Block, Cell, Details, Footer, Headline, Note, Section, Table, as_sentence
 from viz.pages.page import render
 from viz.pages.report import number, series_unit
 
@@ -21,10 +21,10 @@ def page(answers: Sequence[Answer], *, command: str, scenario_hash: str = "") ->
         sentence = f"{len(bad)} of {len(answers)} scenarios are not as they were"
         head = Headline(sentence=f"{sentence}: {', '.join(a.scenario for a in bad)}.", state="fail")
     elif updated:
-        head = Headline(sentence=f"{len(updated)} baselines were written.")
+        written = "1 baseline was" if len(updated) == 1 else f"{len(updated)} baselines were"
+        head = Headline(sentence=f"{written} written.")
     else:
-        all_ = f"All {len(answers)} scenarios are as they were." if len(answers) != 1 else "The scenario is as it was."
-        head = Headline(sentence=all_, state="pass")
+        head = Headline(sentence=f"{as_sentence(unchanged(len(answers)))}.", state="pass")
     rows: list[list[str | Cell]] = [
         [
             a.scenario,

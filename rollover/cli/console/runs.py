@@ -129,6 +129,8 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
 
 def regression(answers: Sequence[Answer], folder: str) -> None:
     """What changed, and one line for each scenario, on standard output."""
+    from rollover.studies.baseline import unchanged
+
     out = terminal.out()
     table = Table(box=None, pad_edge=False)
     for heading in ("scenario", "", "runs", "wall s"):
@@ -161,5 +163,5 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
     written = "1 baseline written" if updated == 1 else f"{updated} baselines written"
     verdict = written if updated else f"{bad} of {len(answers)} scenarios are not as they were"
     if not bad and not updated:
-        verdict = f"all {len(answers)} scenarios are as they were" if len(answers) != 1 else "the scenario is as it was"
+        verdict = unchanged(len(answers))
     out.print(f"{verdict[0].upper()}{verdict[1:]}. Everything: {folder}", style="bold")

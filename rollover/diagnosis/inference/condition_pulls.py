@@ -14,7 +14,10 @@ TUNING = SETTINGS.inference.condition_pulls
 
 
 def mean_pulls(problem: Problem, fitted: Fitted) -> Mapping[str, float]:
-    """Mean pull of each uncertain number over the recordings that state it, in its standard deviations, by path."""
+    """Mean pull of each uncertain number, none of a list, over the recordings that state it, by path.
+
+    In standard deviations of what is stated.
+    """
     found: dict[str, list[float]] = {}
     for e, block in zip(problem.dataset, fitted.blocks, strict=True):
         count = 0 if e.nuisance is None else e.nuisance.shape[1]
@@ -23,7 +26,7 @@ def mean_pulls(problem: Problem, fitted: Fitted) -> Mapping[str, float]:
         z = pulls(e.uncertain, e.marginalised.undone(block.residual), problem.samples_per_error)
         for one, pull in zip(e.doubtful, z[:count], strict=True):
             for path, value in one.items():
-                # a list has one mapping for each of its numbers
+                # numbers of a list have no path of their own, and are left out
                 if isinstance(value, (int, float)):
                     found.setdefault(path, []).append(float(pull))
     return {path: float(np.mean(each)) for path, each in found.items()}

@@ -131,7 +131,7 @@ def _scale_around(thing: Array) -> tuple[str, str]:
         return unknown, own
     said = f"{groups[0]} of its group"
     if thing.dtype.kind in "iu":
-        return f"whole numbers beside {said}, which no convention defines; `scale`, `offset` of a profile say it", ""
+        return cf.undefined(said), ""
     return unknown, said
 
 
@@ -144,7 +144,7 @@ def _signal(thing: Array, index: Index, place: tuple[int, int], profile: Describ
     try:
         values, notes = cf.decoded(np.asarray(thing.load(index)), thing.attributes, thing.fill, place)
         if beside:
-            notes.append(f"{beside} stands beside its numbers, and is not applied; `scale` of a profile does")
+            notes.append(cf.not_applied(beside))
         unit = cf.unit_of(thing.attributes, *place)
         if (since := cf.time_of(values, thing.attributes)) is not None:
             return Signal(values=since[0], unit="s", began=since[1])

@@ -153,7 +153,17 @@ def unknown_scale(attributes: Attributes, dtype: np.dtype[Any]) -> str:
     said = other_scales(attributes) if dtype.kind in "iu" else ""
     if not said:
         return ""
-    return f"whole numbers beside {said}, which no convention defines; `scale`, `offset` of a profile say it"
+    return undefined(said)
+
+
+def undefined(said: str, by: str = "no convention defines") -> str:
+    """Why counts cannot be read beside a scale, in words, that nothing defines."""
+    return f"whole numbers beside {said}, which {by}; `scale`, `offset` of a profile say it"
+
+
+def not_applied(said: str) -> str:
+    """What is to be said of numbers beside what looks like a scale, in words."""
+    return f"{said} stands beside its numbers, and is not applied; `scale` of a profile does"
 
 
 def stated_scale(attributes: Attributes) -> str:

@@ -82,10 +82,8 @@ def _beside_scale(found: Signal, channel: Any) -> Signal:
     if not said or is_clock:
         return found
     if np.dtype(channel.dtype).kind in "iu" and not is_scaled:
-        what = f"whole numbers beside {said}, which TDMS does not define; `scale`, `offset` of a profile say it"
-        return replace(found, unreadable=what)
-    note = f"{said} stands beside its numbers, and is not applied; `scale` of a profile does"
-    return replace(found, notes=(*found.notes, note))
+        return replace(found, unreadable=cf.undefined(said, "TDMS does not define"))
+    return replace(found, notes=(*found.notes, cf.not_applied(said)))
 
 
 def _signal(channel: Any, levels: tuple[Properties, ...], starts: Sequence[tuple[int, int]]) -> Signal:
