@@ -208,6 +208,7 @@ def leaf(function: F) -> F:
 
     It reads and writes arrays and bundles that it is handed, makes and returns none, and calls nothing that does. One
     array is copied into another number by number: as a slice it might be made anew on the way.
+    Kernels call it. Called from Python it may be handed arrays and numbers, but no bundle: that would never be freed.
     """
     return _compiled(function, _nrt=False)  # type: ignore[no-any-return]
 

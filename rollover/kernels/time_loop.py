@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from ground.compiled import compiled, leaf, released
+from ground.compiled import compiled, released
 from rollover.kernels.dense import largest
 from rollover.kernels.forces import added_mass
 from rollover.kernels.generalised_alpha import (
@@ -56,7 +56,7 @@ class Watch(NamedTuple):
     whole: Any  # (COUNTED,)
 
 
-@leaf
+@compiled
 def whole_mass(t: Any, s: Any, w: Any) -> None:
     """Mass matrix of the step that begins: bodies, co-moving masses, turning wheels."""
     for i in range(w.mass.shape[0]):
@@ -126,7 +126,7 @@ def largest_of(A: Any) -> float:
     return most
 
 
-@leaf
+@compiled
 def set_clock(t: Any, now: float) -> None:
     """The scenario's time at the start, before any step, s."""
     t.clock[0], t.clock[1] = 0.0, now

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import leaf
+from ground.compiled import compiled, leaf
 from rollover.kernels.tables import (
     D_DAMPING,
     D_RATE,
@@ -47,7 +47,7 @@ FULL_TORQUE, RISE, UNTIL, DRIVE_NUMBERS = 0, 1, 2, 3
 DROOP = 0.1  # share of the rate limit over which a governor takes the torque back
 
 
-@leaf
+@compiled
 def throttle(t: Any, drive: Any, now: float) -> None:
     """What the engine may give in the next step; `drive` (DRIVE_NUMBERS,), or empty without an engine."""
     if drive.size == 0:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from typing import Any
 
 import numba
@@ -10,6 +12,7 @@ import pytest
 
 from ground.compiled import compiled, leaf
 from ground.kernel import AREA, COLUMNS, LINE_C, LINE_F, LINE_K, LINE_Z, STATE_COLUMNS, normal_force
+from rollover.dynamics import assembly, setup, simulate
 from rollover.dynamics.drop_test import DropModel
 from rollover.kernels.striker import accelerate
 from rollover.kernels.tables import Tables, handle
@@ -42,6 +45,24 @@ def test_a_leaf_that_makes_an_array_is_refused() -> None:
     """Nobody would ever let go of that array."""
     with pytest.raises(Exception, match=r"np\.zeros"):
         _makes_one(3)
+
+
+@pytest.mark.parametrize("integrator", ["exudyn", "compiled"])
+def test_a_run_that_has_ended_holds_no_tables(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Megabytes each, of thousands of runs: what no kernel lets go of is never freed."""
+    made = []
+
+    def made_tables(*args: Any) -> Tables:
+        made.append(assembly.tables_of(*args))
+        return made[-1]
+
+    monkeypatch.setattr(setup, "tables_of", made_tables)
+    short = {"simulation.integrator": integrator, "simulation.duration": 0.01}
+    simulate.run(load("side_overturn").replaced(short))
+    held = [weakref.ref(t.event) for t in made]
+    made.clear()
+    gc.collect()
+    assert [there() for there in held] == [None]
 
 
 def test_a_leaf_reads_a_bundle_as_a_counting_kernel_does() -> None:
