@@ -43,7 +43,7 @@ def recording(*channels: str, until: float = 0.3, start: float = 0.0, **more: An
 
 def run(changes: Mapping[str, Any] | None = None) -> Recording:
     own = toss().replaced({"simulation.duration": 0.5, **(changes or {})})
-    return simulate.run(own).recording
+    return simulate.run(own.of_many()).recording
 
 
 def test_a_prediction_is_the_run_at_the_stamps_less_the_shift() -> None:

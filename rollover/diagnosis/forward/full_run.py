@@ -86,7 +86,7 @@ class RunSimulator:
 
     def __init__(self, scenario: Scenario, recording: Recording) -> None:
         self.recording = recording
-        self.scenario = _covering(scenario, recording)
+        self.scenario = _covering(scenario.of_many(), recording)
         self._made = Tally()
         self._shorter: dict[int, RunSimulator] = {}
         self._phases: dict[tuple[float, ...], tuple[tuple[float, str], ...]] = {}  # by where the grid lies
