@@ -13,6 +13,7 @@ from rollover.dynamics.validity import flag_names
 from rollover.recording import Recording
 from rollover.recording.filters import filtered
 from rollover.spec.channels import describe
+from rollover.system.numbers import brief
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,4 +128,4 @@ def unconverged(peaks: Sequence[PeakLoad]) -> str:
     if peak is None or peak.half_step_change is None or peak.half_step_change <= CONVERGED:
         return ""
     change = 100.0 * peak.half_step_change
-    return f"not converged: half the step changes {peak.channel} (CFC {peak.cfc}) by {change:.2g} %, more than 2 %"
+    return f"not converged: half the step changes {peak.channel} (CFC {peak.cfc}) by {brief(change)} %, more than 2 %"

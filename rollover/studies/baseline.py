@@ -21,6 +21,7 @@ from rollover.scenario import Scenario
 from rollover.spec import document
 from rollover.studies.ensemble import Extreme, Spread, spreads
 from rollover.system.errors import Fault, InputError, hint
+from rollover.system.numbers import percent
 from rollover.system.writing import staged
 
 FOLDER, EXCLUDED = "baselines", "excluded.yaml"
@@ -230,7 +231,7 @@ def sentence_of(difference: Difference) -> str:
         return f"{name}: a load that is gone"
     if difference.change is None:
         return f"{name}: was none, is {difference.now:.4g} {difference.unit}"
-    return f"{name}: {100 * difference.change:+.2g} %, {100 * (difference.tolerance or 0):.2g} % allowed"
+    return f"{name}: {100 * difference.change:+.2g} %, {percent(difference.tolerance or 0)} allowed"
 
 
 def _difference(was: Load | None, now: Spread | None, largest: Mapping[str, float]) -> Difference:

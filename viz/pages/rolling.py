@@ -36,6 +36,8 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
     inputs = [[i["symbol"], i["what"], f"{i['value']:.4g}", i["unit"], i["from"]] for i in answer["inputs"]]
     steps = [[s["symbol"], s["what"], f"{s['value']:.4g}", s["unit"], s["basis"]] for s in answer["steps"]]
     notes: list[Block] = [Note(text=said, warning=True) for said in answer["outside"]]
+    if left_out := answer["effects_left_out"]:
+        notes.append(Note(text=f"Effects were left out: {', '.join(left_out)}.", warning=True))
     notes += [Note(text=f"{answer['source']}."), Note(text=BASIS)]
     blocks: list[Block] = [
         Section(

@@ -72,6 +72,8 @@ def study(
     path = studies.find(name)
     ready = prepared(path, out, changes=settings(set_ or []), given=set_ or [], scheduler=scheduler, force=force)
     chosen = ready.study
+    for line in chosen.scenario.idle:
+        console.say(f"{path}: scenario: {line}")
     way = Way(
         workers=workers,
         scheduler=scheduler,
