@@ -198,7 +198,7 @@ def bars(values: Mapping[str, float], *, label: str, roles: Mapping[str, Role] |
         for k, v in enumerate(numbers):
             left = v < 0.0
             axes.annotate(
-                number_label(v, numbers), (v, k), xytext=(-4 if left else 4, 0), textcoords="offset points",
+                number_label(v, numbers, 3), (v, k), xytext=(-4 if left else 4, 0), textcoords="offset points",
                 ha="right" if left else "left", va="center", color=COLOURS["ink"],
             )  # fmt: skip
         finish(axes, label, "", margins=(0.14, 0.02))

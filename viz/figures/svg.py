@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable, Mapping
 
 NOUGHT = 1e-9  # of the largest: what is summed over a million steps rounds by up to a million times 1e-16 of it
+_TAG = re.compile(r"<[^>]*>")
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 
 
@@ -25,12 +26,16 @@ def cleaned(svg: str, colours: Mapping[str, str]) -> str:
     head = f'<svg role="img" viewBox="{box[1]}" style="max-width: {wide:.0f}px; --natural: {wide:.0f}px">'
     svg = re.sub(r"<svg[^>]*>", head, svg, count=1)
     svg = re.sub(r"\s*font-family: [^;\"]*;?", "", svg)
-    svg = _NUMBER.sub(lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), svg)
+    svg = _TAG.sub(lambda tag: _NUMBER.sub(_short, tag[0]), svg)  # of places and sizes; what is read stays as it is
     for role, colour in colours.items():
         svg = svg.replace(colour, f"var(--{role}, {colour})")
     own = hashlib.sha256(svg.encode()).hexdigest()[:8]
     svg = re.sub(r'(\sid="|="#|url\(#)', rf"\g<1>f{own}-", svg)
     return re.sub(r"\n\s*", "\n", svg)
+
+
+def _short(number: re.Match[str]) -> str:
+    return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
 
 
 def number_label(value: float, beside: Iterable[float], digits: int = 4) -> str:

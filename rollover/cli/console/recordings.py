@@ -61,7 +61,10 @@ def comparison(found: Sequence[Misfit], folder: str) -> None:
             out.print(f"{each.zero.sentence[0].upper()}{each.zero.sentence[1:]}: set to it.", style="yellow")
         if each.clock is not None:
             late, sigma, gain = 1e3 * each.clock.offset, 1e3 * each.clock.sigma, 100.0 * each.clock.gain
-            out.print(f"Clock {late:+.3g} +- {sigma:.2g} ms late; setting it (not done) would remove {gain:.0f} %.")
+            way = "late" if late >= 0.0 else "early"
+            out.print(
+                f"Clock {abs(late):.3g} +- {sigma:.2g} ms {way}; setting it (not done) would remove {gain:.0f} %."
+            )
         for channel, why in each.skipped.items():
             out.print(f"{channel}: left out, {why}", style="yellow")
         for note in each.notes:
