@@ -121,7 +121,8 @@ class Difference:
 
 def unchanged(count: int) -> str:
     """That nothing has changed in so many scenarios, in words."""
-    return "the scenario is as it was" if count == 1 else f"all {count} scenarios are as they were"
+    which = "" if count == 1 else f" of {count} scenarios"
+    return f"no peak load{which} has moved beyond its tolerance"
 
 
 @dataclass(frozen=True, kw_only=True)
