@@ -116,7 +116,10 @@ def _in_words(row: Criterion) -> tuple[str, str, str]:
         margin = f"{row.simulated / asked.value:.2f} x"
     else:
         margin = f"{round(100.0 * row.margin, 1) + 0.0:+.1f} %"
-    return needed, f"{row.simulated * factor:.4g} {unit}", margin
+    simulated = row.simulated * factor
+    if unit == "%":
+        simulated = round(simulated, 3) + 0.0  # less is rounding of the run
+    return needed, f"{simulated:.4g} {unit}", margin
 
 
 def _half_step_in_words(row: Criterion) -> str:

@@ -151,6 +151,8 @@ def test_rounding_errors_are_labelled_zero() -> None:
     assert number_label(-3e-12, [math.nan, -20.0], 3) == "0"
     assert number_label(1.69e-17, [1.69e-17, 3e-17]) == "1.69e-17"  # of quantities that are all that small
     assert number_label(2e-6, [12.5]) == "2e-06"  # small, but no rounding error
+    assert number_label(1156.4, [12.5, 1156.4], 3) == "1156"
+    assert number_label(2.1e9, [2.1e9], 3) == "2.1e+09"
 
 
 def test_what_is_read_in_a_figure_keeps_its_digits() -> None:

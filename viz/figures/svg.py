@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable, Mapping
 
 NOUGHT = 1e-9  # of the largest: what is summed over a million steps rounds by up to a million times 1e-16 of it
+PLAIN = 1e6  # below it a number is written out
 _TAG = re.compile(r"<[^>]*>")
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 
@@ -41,4 +42,5 @@ def _short(number: re.Match[str]) -> str:
 def number_label(value: float, beside: Iterable[float], digits: int = 4) -> str:
     """A value as it stands in a figure: 0 where it is rounding error of the largest finite one `beside` it."""
     largest = max((abs(v) for v in beside if math.isfinite(v)), default=0.0)
-    return "0" if abs(value) <= NOUGHT * largest else f"{value:.{digits}g}"
+    text = f"{value:.{digits}g}"
+    return "0" if abs(value) <= NOUGHT * largest else f"{value:.0f}" if "e+" in text and largest < PLAIN else text

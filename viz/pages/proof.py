@@ -35,7 +35,7 @@ FIRST = {
     "place_right": "place right",
 }
 LINES = {"by_strength": "signal to noise", "by_noise": "noise, share of range", "by_recordings": "recordings"}
-KINDS = {"unexplained": "unexplained", "near": "a near relative", "wrong": "a wrong name", "missed": "nothing"}
+KINDS = {"unexplained": "unexplained", "near": "a near name", "wrong": "a wrong name", "missed": "nothing"}
 
 
 def page(account: Mapping[str, Any], *, command: str, versions: Mapping[str, str]) -> str:
@@ -66,7 +66,7 @@ def headline(summary: Mapping[str, Any]) -> Headline:
         [f"{_fraction(seen)} single effects were detected, {right} of them named alone and right"] if seen["of"] else []
     )
     parts += [f"{_fraction(alarms)} cases without an effect were false alarms"] if alarms["of"] else []
-    detail = [f"{len(failed)} diagnoses failed"] if failed else []
+    detail = [f"{len(failed)} diagnos{'is' if len(failed) == 1 else 'es'} failed"] if failed else []
     if alarms["of"]:
         detail.append(f"with {alarms['of']} such cases the rate of false alarms is at most {percent(alarms['high'])}")
     state: State = "fail" if failed else ""
@@ -106,7 +106,7 @@ def _false_alarms(summary: Mapping[str, Any]) -> list[Block]:
     if p["p_value"] is not None:
         text = f"p-values where nothing was, against the uniform distribution: KS {p['statistic']:.3f} over {p['of']}"
         blocks.append(Note(text=f"{text}, p = {p['p_value']:.2g}."))
-    return [Section(title="Where nothing was", blocks=blocks)]
+    return [Section(title="Cases without an effect", blocks=blocks)]
 
 
 def _confusion(summary: Mapping[str, Any]) -> list[Block]:
@@ -127,7 +127,7 @@ def _confusion(summary: Mapping[str, Any]) -> list[Block]:
         Figure(svg=confusion(table, _right), caption=caption),
         Details(summary="As a list", blocks=[listed]),
     ]
-    return [Section(title="What was taken for what", blocks=blocks)]
+    return [Section(title="Confusion matrix", blocks=blocks)]
 
 
 def _groups(summary: Mapping[str, Any]) -> list[Block]:
