@@ -31,7 +31,6 @@ def report(
     """The answer of a run on standard output; what took part of its time to compile tells no speed."""
     from rollover.assessment.criteria import in_words
     from rollover.assessment.ledger import closure
-    from rollover.assessment.loads import unconverged
     from rollover.assessment.shipped import origin
     from rollover.spec.estimates import in_words as estimated
 
@@ -56,8 +55,7 @@ def report(
         out.print(_criteria(rows))
         for sentence in in_words(rows):
             out.print(sentence)
-    if unsure := unconverged(peaks):
-        out.print(f"{unsure[0].upper()}{unsure[1:]}.", style="bold yellow")
+    _convergence(out, peaks)
     closed = closure(run)
     if closed.is_wide:
         out.print(f"{closed.warning[0].upper()}{closed.warning[1:]}.", style="bold yellow")
@@ -76,6 +74,15 @@ def report(
     if half is not None and half["status"] != "done":
         out.print(f"At half the step the run failed: {half['sentence']}", style="yellow")
     out.print(f"Results: {folder}")
+
+
+def _convergence(out: Console, peaks: Sequence[PeakLoad]) -> None:
+    from rollover.assessment.loads import converged, unconverged
+
+    if unsure := unconverged(peaks):
+        out.print(f"{unsure[0].upper()}{unsure[1:]}.", style="bold yellow")
+    elif settled := converged(peaks):
+        out.print(f"{settled[0].upper()}{settled[1:]}.")
 
 
 def _stand(out: Console, run: Run) -> None:
