@@ -165,6 +165,16 @@ def test_a_crushing_beam_lies_on_the_posts(begins_with: str, tmp_path) -> None:
     assert crush["deflection"] == pytest.approx(30e3 * (1.0 / 5e7 + 1.61 / (210e9 * 8.548e-4)), rel=0.02)
 
 
+def test_an_option_that_changes_nothing_says_so(tmp_path) -> None:
+    """A frame on feet has no mounts that could be held still."""
+    words = ("--mass", "3000", "--segments", "4", "--clamped")
+    feet = call("two_post_rear_tubes_3t", *words, "--out", tmp_path / "feet")
+    mounts = call(written(tmp_path), *words, "--out", tmp_path / "mounts")
+    assert (feet.exit_code, mounts.exit_code) == (0, 0)
+    assert "--clamped changes nothing" in feet.stderr
+    assert "--clamped" not in mounts.stderr
+
+
 def test_soft_mounts_give_and_clamped_feet_do_not(tmp_path) -> None:
     soft = written(tmp_path, **{"[1.0e6, 1.0e6, 1.0e6]": "[1.0e5, 1.0e5, 1.0e5]"})
     found = {
