@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from viz.figures.reading import marked, readable
 from viz.figures.reading import thinned as thinned
-from viz.figures.svg import cleaned, number_label
+from viz.figures.svg import cleaned, number_label, panel_height
 
 Array = NDArray[np.float64]
 Role = Literal["first", "second", "third", "fourth", "limit", "muted", "ink"]
@@ -272,7 +272,8 @@ def polar(curves: Sequence[Curve], *, label: str) -> str:
 
 def outlines(views: Sequence[View]) -> str:
     """Panels to one scale each, beside one another: ROPS, clearance zone and ground from the front and the side."""
-    with canvas(WIDTH, _height(views)) as (figure, svg):
+    shown = [np.vstack([shape.points for shape in view.shapes]) for view in views]
+    with canvas(WIDTH, panel_height(shown, WIDTH)) as (figure, svg):
         for k, view in enumerate(views):
             axes = figure.add_subplot(1, len(views), k + 1)
             for shape in view.shapes:
@@ -295,13 +296,6 @@ def outlines(views: Sequence[View]) -> str:
                 unique.values(), unique.keys(), frameon=False, fontsize=8, loc="outside lower center", ncols=4
             )
     return svg.text
-
-
-def _height(views: Sequence[View]) -> float:
-    """Height, inches, that panels side by side need for what they show to one scale; titles and legend besides."""
-    spans = [np.ptp(np.vstack([shape.points for shape in view.shapes]), axis=0) for view in views]
-    steepest = max((float(up / across) for across, up in spans if across > 0.0), default=1.0)
-    return min(max(0.8 * WIDTH / len(views) * steepest + 1.6, 2.4), 3.6)
 
 
 # ---------------------------------------------------------------- how it is drawn

@@ -5,7 +5,10 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 NOUGHT = 1e-9  # of the largest: what is summed over a million steps rounds by up to a million times 1e-16 of it
 PLAIN = 1e6  # below it a number is written out
@@ -44,3 +47,10 @@ def number_label(value: float, beside: Iterable[float], digits: int = 4) -> str:
     largest = max((abs(v) for v in beside if math.isfinite(v)), default=0.0)
     text = f"{value:.{digits}g}"
     return "0" if abs(value) <= NOUGHT * largest else f"{value:.0f}" if "e+" in text and largest < PLAIN else text
+
+
+def panel_height(shown: Sequence[NDArray[np.float64]], width: float) -> float:
+    """Height, inches, that panels side by side need for points (n, 2) to one scale; titles and legend besides."""
+    spans = [np.ptp(points, axis=0) for points in shown]
+    steepest = max((float(up / across) for across, up in spans if across > 0.0), default=1.0)
+    return min(max(0.8 * width / len(shown) * steepest + 1.6, 2.4), 3.6)
