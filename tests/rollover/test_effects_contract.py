@@ -346,7 +346,7 @@ SWITCHED = (
         ("field_upset_tubes", {}, ("slope",)),  # a frame on feet, over a bank
     ],
 )
-def test_an_effect_that_finds_nothing_to_change_says_what_it_needs(
+def test_an_effect_that_finds_nothing_says_what_it_needs(
     name: str, without: dict[str, Any], effects: tuple[str, ...]
 ) -> None:
     tried = {id: TABLE[id]() for id in (*SWITCHED, "slope", "impact-speed", "mass")}
@@ -359,7 +359,7 @@ def test_an_effect_that_finds_nothing_to_change_says_what_it_needs(
     assert all("nothing feels it here" in text for text in said.values())
 
 
-def test_only_what_replaces_values_alone_may_find_nothing() -> None:
+def test_what_may_find_nothing_says_what_it_needs() -> None:
     """Whoever writes an effect that finds nothing to change in some scenario says what it needs."""
     bare = shipped("cube_toss")
     for effect in TABLE.values():

@@ -64,7 +64,7 @@ def test_what_it_says_without_a_script(report: Path) -> None:
     assert len([t for t, _ in parts.tags if t == "svg"]) == 8  # two outputs: distribution, tornado, two responses
 
 
-def test_a_plan_of_no_draws_says_how_many_cases_pass_the_limit(tmp_path: Path) -> None:
+def test_a_plan_says_how_many_cases_pass_the_limit(tmp_path: Path) -> None:
     study, done = made_up(tmp_path, 40)
     found = account(study, done)
     limit = found["outputs"][0]["limit"]
