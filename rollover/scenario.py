@@ -221,9 +221,14 @@ class Scenario:
     def idle(self) -> tuple[str, ...]:
         """A line for each effect that is switched on, though nothing here need feel it: a striker has no tyres."""
         kind = "drop" if isinstance(self.vehicle, Striker) else "rollover"
-        found = [e for e in self.effects.values() if kind not in e.acts and e != nothing(type(e))]
         which = "overturns" if kind == "drop" else "drop tests"
-        return tuple(f"effects.{e.id}: made for {which}; nothing need feel it here" for e in found)
+        found = []
+        for e in (e for e in self.effects.values() if e != nothing(type(e))):
+            if kind not in e.acts:
+                found.append(f"effects.{e.id}: made for {which}; nothing need feel it here")
+            elif e.needs and not e.changes(self):
+                found.append(f"effects.{e.id}: needs {e.needs}; nothing feels it here")
+        return tuple(found)
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:

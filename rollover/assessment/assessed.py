@@ -19,6 +19,7 @@ from rollover.dynamics.result import Run
 from rollover.recording import Recording, arrow_table, data_frame
 from rollover.scenario import Scenario
 from rollover.system.notebook import card
+from rollover.system.numbers import percent
 
 if TYPE_CHECKING:
     from rollover.recording.runs import DataFrame, Table
@@ -132,7 +133,7 @@ class AssessedRun:
                 f"{peak.raw_time:.3f}",
                 f"{peak.filtered:.5g}",
                 f"{peak.filtered_time:.3f}",
-                "" if peak.half_step_change is None else f"{100.0 * peak.half_step_change:.2g} %",
+                "" if peak.half_step_change is None else percent(peak.half_step_change),
             )
             for peak in self.peaks
             if peak.raw != 0.0  # a wheel that never touched

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from rollover.spec.standards.requirement import Requirement
+from rollover.system.numbers import brief, percent
 
 Verdict = Literal["met", "not met", "no verdict", "compared"]
 ROUNDING = 1e-9  # relative; a force that is held at what was asked is what was asked
@@ -115,7 +116,10 @@ def _in_words(row: Criterion) -> tuple[str, str, str]:
         margin = f"{row.simulated / asked.value:.2f} x"
     else:
         margin = f"{round(100.0 * row.margin, 1) + 0.0:+.1f} %"
-    return needed, f"{row.simulated * factor:.4g} {unit}", margin
+    simulated = row.simulated * factor
+    if unit == "%":
+        simulated = round(simulated, 3) + 0.0  # less is rounding of the run
+    return needed, f"{simulated:.4g} {unit}", margin
 
 
 def _half_step_in_words(row: Criterion) -> str:
@@ -123,7 +127,7 @@ def _half_step_in_words(row: Criterion) -> str:
         return ""
     change = row.at_half_step - row.simulated
     if row.requirement.quantity == "distance":
-        return f"{1e3 * abs(change):.2g} mm"
+        return f"{brief(1e3 * abs(change))} mm"
     if row.requirement.quantity == "share" or not row.simulated:
-        return f"{100.0 * abs(change):.2g} points"
-    return f"{100.0 * abs(change / row.simulated):.2g} %"
+        return f"{brief(100.0 * abs(change))} points"
+    return percent(abs(change / row.simulated))

@@ -12,6 +12,7 @@ import numpy as np
 from rollover.dynamics.equilibrium import TOLERANCE
 from rollover.dynamics.result import Run
 from rollover.spec.vehicle import Striker, Vehicle
+from rollover.system.numbers import percent
 
 LIMIT = 0.005  # a load goes with the root of an energy at most linearly: 0.5 % of it is 0.25 to 0.5 % of a load
 
@@ -40,8 +41,8 @@ class Closure:
         if not math.isfinite(self.largest):
             return ""
         return (
-            f"Energy ledger: at most {_percent(self.largest)} of the energy released is unaccounted for "
-            f"(at {self.at:.3f} s; {_percent(self.end)} at the end)"
+            f"Energy ledger: at most {percent(self.largest)} of the energy released is unaccounted for "
+            f"(at {self.at:.3f} s; {percent(self.end)} at the end)"
         )
 
     @property
@@ -50,8 +51,8 @@ class Closure:
         if not self.is_wide:
             return ""
         return (
-            f"the energy ledger does not close: {_percent(self.largest)} of the energy released is unaccounted for at "
-            f"{self.at:.3f} s, more than {_percent(LIMIT)}; a smaller simulation.step than {self.step:g} s is needed"
+            f"the energy ledger does not close: {percent(self.largest)} of the energy released is unaccounted for at "
+            f"{self.at:.3f} s, more than {percent(LIMIT)}; a smaller simulation.step than {self.step:g} s is needed"
         )
 
 
@@ -87,13 +88,9 @@ def resolution(run: Run) -> float:
 
 def of_cases(ledger: Mapping[str, Any]) -> str:
     """In how many cases of a study the ledger stays open, by what its account says, and the cure."""
-    most = _percent(ledger["largest_residual"])
+    most = percent(ledger["largest_residual"])
     return (
         f"The energy ledger does not close in {ledger['open']} cases: up to {most} of the "
-        f"energy released is unaccounted for (point {ledger['at_point']}), more than {_percent(ledger['limit'])}; "
+        f"energy released is unaccounted for (point {ledger['at_point']}), more than {percent(ledger['limit'])}; "
         "a smaller simulation.step is needed"
     )
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"

@@ -13,6 +13,7 @@ from rollover.dynamics.validity import flag_names
 from rollover.recording import Recording
 from rollover.recording.filters import filtered
 from rollover.spec.channels import describe
+from rollover.system.numbers import brief, percent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,10 +122,19 @@ def leading(peaks: Sequence[PeakLoad]) -> PeakLoad | None:
     return next(iter([*first, *(p for p in peaks if p.raw != 0.0)]), None)
 
 
+def converged(peaks: Sequence[PeakLoad]) -> str:
+    """A sentence if the leading load moves by no more than `CONVERGED` at half the step, otherwise nothing."""
+    peak = leading(peaks)
+    if peak is None or peak.half_step_change is None or peak.half_step_change > CONVERGED:
+        return ""
+    change = percent(peak.half_step_change)
+    return f"converged: half the step changes {peak.channel} (CFC {peak.cfc}) by {change}, at most 2 % is allowed"
+
+
 def unconverged(peaks: Sequence[PeakLoad]) -> str:
     """A sentence if the leading load moves by more than `CONVERGED` at half the step, otherwise nothing."""
     peak = leading(peaks)
     if peak is None or peak.half_step_change is None or peak.half_step_change <= CONVERGED:
         return ""
     change = 100.0 * peak.half_step_change
-    return f"not converged: half the step changes {peak.channel} (CFC {peak.cfc}) by {change:.2g} %, more than 2 %"
+    return f"not converged: half the step changes {peak.channel} (CFC {peak.cfc}) by {brief(change)} %, more than 2 %"

@@ -31,12 +31,16 @@ WHERE = {  # where a vehicle file would say what it does not
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """A vehicle's name, inputs with where each comes from, and what of it lies outside the calculation's field."""
+    """A vehicle's name, inputs with where each comes from, and what of it lies outside the calculation's field.
+
+    `effects_left_out` are the scenario's, of which the calculation knows none.
+    """
 
     vehicle: str
     tractor: NarrowTractor
     origins: Mapping[str, str]
     outside: tuple[str, ...]
+    effects_left_out: tuple[str, ...]
 
 
 def asked(scenario: Scenario, given: Mapping[str, Any] | None = None) -> Asked:
@@ -66,7 +70,13 @@ def asked(scenario: Scenario, given: Mapping[str, Any] | None = None) -> Asked:
     except ValueError as e:
         raise _fault(e, given) from None
     origins.update({name: "regulation, recalled" for name in ("A0", "U", "T") if name not in given})
-    return Asked(vehicle=vehicle.name, tractor=tractor, origins=origins, outside=_outside(vehicle, tractor))
+    return Asked(
+        vehicle=vehicle.name,
+        tractor=tractor,
+        origins=origins,
+        outside=_outside(vehicle, tractor),
+        effects_left_out=tuple(sorted(scenario.effects)),
+    )
 
 
 def _known(vehicle: Vehicle) -> dict[str, float]:
@@ -135,6 +145,7 @@ def account(of: Asked, found: Rolling, about: Mapping[str, Any] | None = None) -
         "sentence": found.sentence,
         "version": found.version,
         "outside": list(of.outside),
+        "effects_left_out": list(of.effects_left_out),
         "source": SOURCE,
         "inputs": [
             {

@@ -288,7 +288,7 @@ def _first_shown(recording: Recording, channel: str, run: Recording, contact: fl
 
 
 def is_quiet(z: Array, least: int = QUIET) -> bool:
-    """Whether what comes before a contact, in units of the noise, stays what it is: a blow that has begun does not."""
+    """Whether what comes before a contact, in units of the noise, stays as it is: an impact that has begun does not."""
     fall = z[: -(z.size // 4) or None]
     return fall.size >= least and abs(float(np.polyfit(np.linspace(0.0, 1.0, fall.size), fall, 1)[0])) < DRIFT
 

@@ -68,6 +68,7 @@ class Effect:
     sentence: ClassVar[str] = ""  # for a test engineer; {parameter} or {parameter:more|less} stands for a value
     rivals: ClassVar[Mapping[str, str]] = {}  # look-alike -> the test that tells them apart
     acts: ClassVar[tuple[str, ...]] = ("drop", "rollover")
+    needs: ClassVar[str] = ""  # of an effect that does nothing but `changes`: what a scenario may be without
     channels: ClassVar[tuple[str, ...]] = ()  # that feel it first
     solid: ClassVar[bool] = False  # it is of ground that keeps its shape: no fluid has it
     competes: ClassVar[bool] = True  # as an explanation of what a scenario misses

@@ -119,6 +119,7 @@ class SlopeError(Effect):
         "centre-of-mass": "the same test downhill the other way",
     }
     acts = ("rollover",)
+    needs = "a surface of kind plane or slope"
     channels = ("chassis/acceleration_y", "chassis/roll")
     null: ClassVar[Mapping[str, float | None]] = {"angle": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"angle": Search(-0.1, 0.1)}
@@ -149,6 +150,7 @@ class ImpactSpeed(Effect):
         "soil-viscous-damping": "the integral of the acceleration before contact",
         "sensor-scale": "the double integral of the acceleration against the displacement",
     }
+    needs = "an initiation of kind drop"
     channels = ("striker/velocity_z", "ground/sinkage", "ground/force_normal")
     null: ClassVar[Mapping[str, float | None]] = {"scale": 1.0}
     search: ClassVar[Mapping[str, Search]] = {"scale": Search(0.8, 1.25, "log")}

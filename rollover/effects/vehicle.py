@@ -28,6 +28,7 @@ class RopsElasticity(Effect):
         "mount-play": "the force as the deflection goes to zero: play has a dead zone there",
     }
     acts = ("rollover",)
+    needs = "a ROPS"
     channels = ("rops/deflection", "rops/force", "rops/force_y")
     null: ClassVar[Mapping[str, float | None]] = {"stiffness": None}
     search: ClassVar[Mapping[str, Search]] = {"stiffness": Search(3e4, 3e7, "log")}
@@ -65,6 +66,7 @@ class RopsPlasticity(Effect):
         "sensor-clipping": "the deflection: it goes on while the force stays",
     }
     acts = ("rollover",)
+    needs = "a ROPS"
     channels = ("rops/force", "rops/force_y", "rops/deflection")
     null: ClassVar[Mapping[str, float | None]] = {"yield_force": None}
     search: ClassVar[Mapping[str, Search]] = {"yield_force": Search(3e3, 3e5, "log")}
@@ -100,6 +102,7 @@ class TyreDamping(Effect):
     sentence = "Each tyre is damped by {damping}."
     rivals: ClassVar[Mapping[str, str]] = {"inertia": "a bounce on the spot", "axle-stop": "the angle of the axle"}
     acts = ("rollover",)
+    needs = "wheels"
     channels = ("wheel/rear_left/force_normal", "chassis/angular_velocity_x")
     null: ClassVar[Mapping[str, float | None]] = {"damping": None}
     search: ClassVar[Mapping[str, Search]] = {"damping": Search(100.0, 3e4, "log")}
@@ -125,6 +128,7 @@ class TyreLateralStiffness(Effect):
     sentence = "Each tyre deflects laterally by {stiffness}."
     rivals: ClassVar[Mapping[str, str]] = {"centre-of-mass": "a static tilt test with the tyres blocked"}
     acts = ("rollover",)
+    needs = "wheels"
     channels = ("chassis/position_y", "chassis/roll")
     null: ClassVar[Mapping[str, float | None]] = {"stiffness": None}
     search: ClassVar[Mapping[str, Search]] = {"stiffness": Search(1e4, 3e6, "log")}
@@ -151,6 +155,7 @@ class AxleStop(Effect):
     sentence = "The front axle meets its stops at {angle}."
     rivals: ClassVar[Mapping[str, str]] = {"inertia": "the angle of the axle at the step in roll acceleration"}
     acts = ("rollover",)
+    needs = "a front axle that swings"
     channels = ("axle/front/angle", "chassis/angular_velocity_x")
     null: ClassVar[Mapping[str, float | None]] = {"angle": None, "stiffness": None}
     search: ClassVar[Mapping[str, Search]] = {"angle": Search(0.02, 0.5), "stiffness": Search(1e4, 1e7, "log")}
@@ -216,6 +221,7 @@ class MountPlay(Effect):
         "rops-elasticity": "the force as the deflection goes to zero",
     }
     acts = ("rollover",)
+    needs = "a ROPS"
     channels = ("rops/deflection", "rops/force")
     null: ClassVar[Mapping[str, float | None]] = {"gap": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"gap": Search(5e-4, 0.05, "log")}

@@ -1,4 +1,4 @@
-"""How much of a channel is noise: its level, its colour, and how many of its samples are independent.
+"""How much of a channel is noise: its level, its autocorrelation, and how many of its samples are independent.
 
 Windows of 48 samples lose a cubic by least squares; those that then hold little more than the quietest are kept. With
 residuals r = Q x, Q = 1 - P, the sums c_k = sum_i r_i r_(i+k) of noise with autocovariances gamma_j, j <= 8, have
@@ -30,7 +30,7 @@ ORDER = 12  # of the longest autoregression tried
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseFloor:
-    """Noise of one channel: `sigma` in its unit, and its colour x_t = sum_k ar_k x_(t-k) + e_t.
+    """Noise of one channel: `sigma` in its unit, and its autocorrelation x_t = sum_k ar_k x_(t-k) + e_t.
 
     `independence` samples count as one independent sample of a mean, at least 1; `windows` is how many were quiet.
     Noise far below the sampling rate (a channel filter at 10 kHz) is drawn well by `ar`, but not whitened by it: its
@@ -51,7 +51,7 @@ class NoiseFloor:
         return float(self.sigma / np.sqrt(self.effective(count)))
 
     def drawn(self, count: int, random: np.random.Generator, draws: int = 1) -> Array:
-        """Noise of this level and colour, (draws, count)."""
+        """Noise of this level and autocorrelation, (draws, count)."""
         from scipy.signal import lfilter
 
         lead = 200 + 20 * int(self.independence) if self.ar else 0

@@ -21,6 +21,7 @@ from rollover.scenario import Scenario
 from rollover.spec import document
 from rollover.studies.ensemble import Extreme, Spread, spreads
 from rollover.system.errors import Fault, InputError, hint
+from rollover.system.numbers import percent
 from rollover.system.writing import staged
 
 FOLDER, EXCLUDED = "baselines", "excluded.yaml"
@@ -120,7 +121,8 @@ class Difference:
 
 def unchanged(count: int) -> str:
     """That nothing has changed in so many scenarios, in words."""
-    return "the scenario is as it was" if count == 1 else f"all {count} scenarios are as they were"
+    which = "" if count == 1 else f" of {count} scenarios"
+    return f"no peak load{which} has moved beyond its tolerance"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,7 +232,7 @@ def sentence_of(difference: Difference) -> str:
         return f"{name}: a load that is gone"
     if difference.change is None:
         return f"{name}: was none, is {difference.now:.4g} {difference.unit}"
-    return f"{name}: {100 * difference.change:+.2g} %, {100 * (difference.tolerance or 0):.2g} % allowed"
+    return f"{name}: {100 * difference.change:+.2g} %, {percent(difference.tolerance or 0)} allowed"
 
 
 def _difference(was: Load | None, now: Spread | None, largest: Mapping[str, float]) -> Difference:

@@ -14,6 +14,7 @@ from rollover.studies.design import Points
 from rollover.studies.runner import START, Builder, Conducted, Show, Way, evaluate
 from rollover.studies.study import Output, Study
 from rollover.studies.summary import values_of
+from rollover.system.numbers import percent
 
 # of a response: a hundredth of a load changes no answer. What is smooth differs by less than 1e-6: what is above is
 # chance, or one of the two is wrong
@@ -132,9 +133,7 @@ def sentence(check: dict[str, Any] | None) -> str:
     if check["largest"] is None:
         found = f"{what}: no response to compare"
     else:
-        found = (
-            f"{what}: responses differ by {_percent(check['median'])} (median), {_percent(check['largest'])} at most"
-        )
+        found = f"{what}: responses differ by {percent(check['median'])} (median), {percent(check['largest'])} at most"
     if (beside := check.get("neighbours")) is not None:
         found += f"; {_scattered(beside)}"
     if other := check["ended_otherwise"]:
@@ -152,16 +151,12 @@ def _scattered(beside: dict[str, Any]) -> str:
     elif first["scatter"] is None:
         found = f"the largest, {where}, is 0 in all neighbouring starts"
     else:
-        found = f"the largest, {where}, scatters by {_percent(first['scatter'])} between neighbouring starts"
+        found = f"the largest, {where}, scatters by {percent(first['scatter'])} between neighbouring starts"
     beyond = [one for one in every if one["within"] is False]
     if not beyond:
         return found
     names = ", ".join(f"{one['name']} of point {one['point']}" for one in beyond)
     return f"{found}; beyond what these scatter by: {names}"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
 
 
 def _apart(a: Any, b: Any) -> Sequence[float]:

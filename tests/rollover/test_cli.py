@@ -309,6 +309,17 @@ def test_list_refuses_what_does_not_fit() -> None:
     assert rollover("list", "laws", "x").exit_code == 2
 
 
+def test_check_names_an_effect_that_nothing_feels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    effects = "effects: {mount-play: {gap: 0.01}, mass: {added: 50.0}}"
+    Path("own.yaml").write_text(f"base: side_overturn\ntitle: own\nvehicle: {{rops: null}}\n{effects}\n")
+    done = rollover("check", "own.yaml")
+    assert done.exit_code == 0, done.output
+    said = "effects.mount-play: needs a ROPS; nothing feels it here"
+    assert done.stdout == f"own.yaml: scenario, valid\n  note: {said}\n"
+    assert json.loads(rollover("check", "own.yaml", "--json").stdout)["files"][0]["notes"] == [said]
+
+
 def test_check_tells_all_faults_of_all_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("a.yaml").write_text(TEXT.replace("speed: 3.0", "sped: 3.0"))

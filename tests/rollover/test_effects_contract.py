@@ -9,7 +9,7 @@ import shutil
 import string
 import subprocess
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -329,6 +329,43 @@ def test_an_effect_on_a_missing_part_changes_nothing_and_says(effect: type[Effec
     assert same(run(with_it).recording, run(landed).recording)
     assert with_it.idle == (f"effects.{effect.id}: made for drop tests; nothing need feel it here",)
     assert not with_effect(landed, nothing(effect)).idle
+
+
+SWITCHED = (
+    "rops-elasticity", "rops-plasticity", "mount-play", "axle-stop", "tyre-damping", "tyre-lateral-stiffness",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "without", "effects"),
+    [
+        ("cube_toss", {}, (*SWITCHED, "impact-speed")),
+        ("side_overturn", {"vehicle.rops": None}, ("rops-elasticity", "rops-plasticity", "mount-play")),
+        ("bank_overturn", {}, ("slope", "impact-speed")),
+        ("side_overturn", {}, ()),
+        ("field_upset_tubes", {}, ("slope",)),  # a frame on feet, over a bank
+    ],
+)
+def test_an_effect_that_finds_nothing_says_what_it_needs(
+    name: str, without: dict[str, Any], effects: tuple[str, ...]
+) -> None:
+    tried = {id: TABLE[id]() for id in (*SWITCHED, "slope", "impact-speed", "mass")}
+    if name != "bank_overturn" and "impact-speed" not in effects:
+        tried.pop("impact-speed")  # these begin with no drop either
+    chosen = replace(shipped(name).replaced(without), effects=tried)
+    said = dict(line.removeprefix("effects.").split(": ", 1) for line in chosen.idle)
+    assert set(said) == set(effects)
+    assert all(text.startswith("needs ") for text in said.values())
+    assert all("nothing feels it here" in text for text in said.values())
+
+
+def test_what_may_find_nothing_says_what_it_needs() -> None:
+    """Whoever writes an effect that finds nothing to change in some scenario says what it needs."""
+    bare = shipped("cube_toss")
+    for effect in TABLE.values():
+        acts = effect.changes is not Effect.changes and "rollover" in effect.acts and effect().places() == {}
+        if acts and effect.kind != "sensor":
+            assert bool(effect.needs) or effect().changes(bare), effect.id
 
 
 def test_a_rate_at_another_speed_is_stiffness_and_usual_rate() -> None:

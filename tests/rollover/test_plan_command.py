@@ -43,6 +43,10 @@ def test_a_plan_is_written_said_and_drawn(tmp_path: Path) -> None:
         )
     page = (out / "report.html").read_text()
     assert "<svg" in page
+    apart = [set(t["effects"]) for t in answer["next_tests"] if t["probability"] < 0.95]
+    assert f"effects would show in these drops, {2 - len(apart)} of 2 pairs told apart with 95% or more." in page
+    best = [t["best"] for t in answer["next_tests"] if t["best"] is not None]
+    assert ("Next: " in page) is bool(best)
     assert "What to measure next" in page
     assert "rollover plan drop_test" in page
     again = asked(*words, *pairs, "--noise", "ground/force_normal=30", "--json")

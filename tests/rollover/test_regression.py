@@ -76,7 +76,7 @@ def test_the_same_tree_passes_in_child_processes(folder: Path) -> None:
     assert json.loads((out / "regress.json").read_text()) == found
     assert (out / "regress.csv").read_text().count("\n") == 1 + sum(len(a["differences"]) for a in found["answers"])
     page = (out / "report.html").read_text()
-    assert "All 2 scenarios are as they were." in page
+    assert "No peak load of 2 scenarios has moved beyond its tolerance." in page
     assert "http" not in page
 
 
@@ -209,7 +209,7 @@ def test_an_update_without_change_writes_nothing(folder: Path) -> None:
     done = regress(folder, "--update", "--reason", "no reason at all")
     assert done.exit_code == 0
     assert done.stdout.count("nothing new to write; ") == 2
-    assert "All 2 scenarios are as they were." in done.stdout
+    assert "No peak load of 2 scenarios has moved beyond its tolerance." in done.stdout
     assert kept(folder) == before
 
 

@@ -56,6 +56,25 @@ def test_what_lies_outside_its_field_is_said(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "rolling.json").read_text())["outside"][0] in said
 
 
+def test_effects_of_a_scenario_are_left_out_and_named(tmp_path: Path) -> None:
+    own = tmp_path / "own.yaml"
+    own.write_text(
+        "base: side_overturn\ntitle: own\nvehicle: vehicles/vineyard_tractor.yaml\n"
+        "effects: {mass: {added: 300.0}, centre-of-mass: {height: 0.3}}\n"
+    )
+    done = rollover(own, "--out", tmp_path / "with")
+    assert done.exit_code == 0, done.output
+    assert "Effects were left out: centre-of-mass, mass." in done.stdout
+    answer, plain = json.loads((tmp_path / "with" / "rolling.json").read_text()), tmp_path / "plain"
+    assert answer["effects_left_out"] == ["centre-of-mass", "mass"]
+    assert "Effects were left out: centre-of-mass, mass." in (tmp_path / "with" / "report.html").read_text()
+    assert rollover("vineyard_tractor", "--out", plain).exit_code == 0
+    without = json.loads((plain / "rolling.json").read_text())
+    assert without["effects_left_out"] == []
+    assert without["steps"] == answer["steps"]
+    assert "left out" not in (plain / "report.html").read_text()
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

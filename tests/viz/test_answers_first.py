@@ -73,6 +73,9 @@ def test_a_calibration_shows_curves_and_correlations(drop: Run) -> None:
     )
     before, after = compared(drop, 1.3), compared(drop, 1.02)
     text = calibration.page(c, curves=[(before, after)], command="rollover calibrate")
+    head = re.search(r'<div class="headline.*?</div>', text, flags=re.DOTALL)
+    assert head is not None
+    assert "vehicle.mass 2 kg (1.5 to 2.5); " in head[0]
     order = re.findall(r"<h2>(.*?)</h2>", text)
     assert order[:2] == ["Before and after", "Parameters"]
     first = text[text.index("<h2>Before and after") : text.index("<h2>Parameters")]

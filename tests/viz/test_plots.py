@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from viz.figures import plots
+from viz.figures.heat_map import heat_map
 from viz.figures.plots import COLOURS, Curve, Level, Outline, View, thinned
 from viz.figures.reading import MOST_POINTS
 from viz.figures.svg import number_label
@@ -150,3 +151,16 @@ def test_rounding_errors_are_labelled_zero() -> None:
     assert number_label(-3e-12, [math.nan, -20.0], 3) == "0"
     assert number_label(1.69e-17, [1.69e-17, 3e-17]) == "1.69e-17"  # of quantities that are all that small
     assert number_label(2e-6, [12.5]) == "2e-06"  # small, but no rounding error
+    assert number_label(1156.4, [12.5, 1156.4], 3) == "1156"
+    assert number_label(2.1e9, [2.1e9], 3) == "2.1e+09"
+
+
+def test_what_is_read_in_a_figure_keeps_its_digits() -> None:
+    """Places of lines are rounded to a hundredth of a pixel; labels are not places."""
+    svg = plots.bars({"a": 12.5, "b": -0.00123}, label="kJ")
+    assert "-0.00123" in re.findall(r"<text[^>]*>([^<]*)</text>", svg)
+    assert not re.search(r"<[^>]*-?\d\.\d{3,}", svg)
+    levels = np.array([0.0125, 0.0375]), np.array([1.125, 2.375])
+    grid = [np.repeat(levels[0], 2), np.tile(levels[1], 2)]
+    drawn = heat_map(*grid, np.arange(4.0), across="gap, m", up="speed, m/s", label="kN")
+    assert {"0.0125", "0.0375", "1.125", "2.375"} <= set(re.findall(r"<text[^>]*>([^<]*)</text>", drawn))

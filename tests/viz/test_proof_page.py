@@ -68,7 +68,7 @@ def test_the_answer_comes_first_and_false_alarms_with_it(account: dict[str, Any]
     said = made(account).said
     assert "2 of 3 single effects were detected, 1 of them named alone and right;" in said
     assert "1 of 2 cases without an effect were false alarms." in said
-    assert "1 diagnoses failed; with 2 such cases the rate of false alarms is at most 99 %." in said
+    assert "1 diagnosis failed; with 2 such cases the rate of false alarms is at most 99 %." in said
     assert 'class="headline fail"' in made(account).text
 
 

@@ -215,7 +215,7 @@ def test_the_page_of_a_regression() -> None:
     assert ["tip", *row] in parts.rows
     assert row in parts.rows
     assert "tip: n!" in parts.said
-    assert "The scenario is as it was." in Parts(regression.page([good], command="x")).said
+    assert "No peak load has moved beyond its tolerance." in Parts(regression.page([good], command="x")).said
 
 
 def test_text_is_text_and_a_row_fits_its_headings() -> None:

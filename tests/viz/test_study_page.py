@@ -64,6 +64,17 @@ def test_what_it_says_without_a_script(report: Path) -> None:
     assert len([t for t, _ in parts.tags if t == "svg"]) == 8  # two outputs: distribution, tornado, two responses
 
 
+def test_a_plan_says_how_many_cases_pass_the_limit(tmp_path: Path) -> None:
+    study, done = made_up(tmp_path, 40)
+    found = account(study, done)
+    limit = found["outputs"][0]["limit"]
+    beyond = {"beyond": "above", "limit": limit, "hits": 11, "cases": 38, "failed": 2}
+    found["outputs"][0] |= {"exceedance": None, "beyond_limit": beyond}
+    text = page(study, done, {**found, "drawn": False}, command="rollover study drops")
+    head = text[text.index('class="headline') :].partition("</div>")[0]
+    assert f", above {1e-3 * limit:.4g} kN in 11 of 38 cases." in head
+
+
 def test_data_cannot_break_out_of_the_page() -> None:
     words = ["</script><b>", 'a "quoted" & <i>']
     cases = Cases(columns=[("x", [1.0, None]), ("in words", words)])

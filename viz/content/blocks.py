@@ -16,6 +16,9 @@ def as_sentence(text: str) -> str:
     return text[:1].upper() + text[1:] if text.partition(" ")[0].isalpha() else text
 
 
+WORDY = 20  # letters of a cell: more than a name or a number
+
+
 @dataclass(frozen=True, kw_only=True)
 class Headline:
     """The answer in a sentence, what it rests on in `detail`, and whether it is good, bad or neither."""
@@ -60,6 +63,12 @@ class Table:
     def cells(self) -> list[list[Cell]]:
         """All cells, plain text too."""
         return [[c if isinstance(c, Cell) else Cell(c) for c in row] for row in self.rows]
+
+    @property
+    def wordy(self) -> set[int]:
+        """Columns of sentences: a narrow screen gives them a width, or their rows would be as high as they are long."""
+        most = [max((len(row[k].text) for row in self.cells), default=0) for k in range(len(self.columns))]
+        return {k for k, letters in enumerate(most) if letters > WORDY and k not in self.numeric}
 
 
 @dataclass(frozen=True, kw_only=True)

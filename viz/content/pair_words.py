@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rollover.comparison.run_pair import Change, LoadChange, Pair
+from rollover.system.numbers import percent
 from viz.content.entities import series
 from viz.content.verdict import amount
 
@@ -17,7 +18,7 @@ def answer(found: Pair) -> str:
     load = found.leading
     if load is None:
         return "No load was recorded in both runs."
-    return f"{named(load.channel)}: {value(load, load.was)} before, {value(load, load.now)} now: {percent(load)}."
+    return f"{named(load.channel)}: {value(load, load.was)} before, {value(load, load.now)} now: {relative(load)}."
 
 
 def detail(found: Pair) -> str:
@@ -26,7 +27,7 @@ def detail(found: Pair) -> str:
     load = found.leading
     if load is not None and load.change:
         known = "what half the step changes was examined in neither run"
-        parts.append(known if load.step is None else f"half the step changes it by {100.0 * load.step:.2g} %")
+        parts.append(known if load.step is None else f"half the step changes it by {percent(load.step)}")
     moved = sum(x.verdict.startswith("changed") for x in found.loads)
     parts.append(f"{moved} of {len(found.loads)} loads changed by more than the step's error as far as that is known")
     count = len(found.changes)
@@ -41,7 +42,7 @@ def markdown(found: Pair) -> str:
     lines = [f"# {answer(found)}", "", detail(found), ""]
     lines += ["| load | baseline | candidate | change | |", "|---|---|---|---|---|"]
     for x in found.loads:
-        cells = (named(x.channel), value(x, x.was), value(x, x.now), percent(x), x.verdict)
+        cells = (named(x.channel), value(x, x.was), value(x, x.now), relative(x), x.verdict)
         lines.append("| " + " | ".join(cells) + " |")
     lines += ["", f"Baseline: {found.baseline.folder}, orange. Candidate: {found.candidate.folder}, blue.", ""]
     if found.changes:
@@ -64,7 +65,7 @@ def value(load: LoadChange, peak: float | None) -> str:
     return "none" if peak is None else amount(peak, s.unit or load.unit, s.factor if s.unit else 1.0)
 
 
-def percent(load: LoadChange) -> str:
+def relative(load: LoadChange) -> str:
     """The relative change."""
     return "" if load.change is None else f"{100.0 * load.change:+.3g} %"
 

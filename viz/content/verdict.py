@@ -14,6 +14,7 @@ from rollover.assessment.ledger import closure
 from rollover.assessment.stand_results import findings
 from rollover.dynamics.result import Run
 from rollover.spec.stand import TiltTable
+from rollover.system.numbers import percent
 from viz.content.differences import differences_lines
 from viz.content.entities import series, shown
 
@@ -299,7 +300,7 @@ def _ledger(run: Run) -> list[str]:
         return []
     residual, closed = run.ledger.get("residual", math.nan), closure(run)
     share = abs(residual) / run.released if run.released > 0.0 else math.nan
-    judged = f", {100.0 * share:.2g} % of the {joules(run.released)} released" if math.isfinite(closed.end) else ""
+    judged = f", {percent(share)} of the {joules(run.released)} released" if math.isfinite(closed.end) else ""
     names = [name for name, value in run.ledger.items() if name != "residual" and value]
     lines = [f"**Energy:** {joules(residual)} unaccounted for{judged}.", ""]
     if closed.is_wide:

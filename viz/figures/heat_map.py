@@ -24,16 +24,18 @@ def heat_map(
     up: str,
     label: str,
     signed: bool = False,
+    span: tuple[float, float] | None = None,
 ) -> str:
     """Cells of equal size at the levels of x and y (n,), numbers or words, coloured by `values` (n,), NaN crossed.
 
-    `signed` values go from -1 to 1, and are the darker the farther they are from 0.
+    Colours go from the least value to the largest, or over a `span` of values that means something by itself. `signed`
+    values go from -1 to 1, and are the darker the farther they are from 0.
     """
     columns, rows = (list(dict.fromkeys(sorted(v.tolist()) if v.dtype != object else v.tolist())) for v in (x, y))
     cells = np.full((len(rows), len(columns)), np.nan)
     for a, b, value in zip(x.tolist(), y.tolist(), values, strict=True):
         cells[rows.index(b), columns.index(a)] = value
-    low, high = (-1.0, 1.0) if signed else (float(np.nanmin(cells)), float(np.nanmax(cells)))
+    low, high = span or ((-1.0, 1.0) if signed else (float(np.nanmin(cells)), float(np.nanmax(cells))))
     with canvas(4.6, 3.2) as (figure, svg):
         axes = figure.add_subplot()
         colours = shades(COLOURS["second"], PAPER, COLOURS["first"]) if signed else shades(PAPER, COLOURS["first"])

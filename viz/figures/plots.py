@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from viz.figures.reading import marked, readable
 from viz.figures.reading import thinned as thinned
-from viz.figures.svg import cleaned, number_label
+from viz.figures.svg import cleaned, number_label, panel_height
 
 Array = NDArray[np.float64]
 Role = Literal["first", "second", "third", "fourth", "limit", "muted", "ink"]
@@ -198,7 +198,7 @@ def bars(values: Mapping[str, float], *, label: str, roles: Mapping[str, Role] |
         for k, v in enumerate(numbers):
             left = v < 0.0
             axes.annotate(
-                number_label(v, numbers), (v, k), xytext=(-4 if left else 4, 0), textcoords="offset points",
+                number_label(v, numbers, 3), (v, k), xytext=(-4 if left else 4, 0), textcoords="offset points",
                 ha="right" if left else "left", va="center", color=COLOURS["ink"],
             )  # fmt: skip
         finish(axes, label, "", margins=(0.14, 0.02))
@@ -272,7 +272,8 @@ def polar(curves: Sequence[Curve], *, label: str) -> str:
 
 def outlines(views: Sequence[View]) -> str:
     """Panels to one scale each, beside one another: ROPS, clearance zone and ground from the front and the side."""
-    with canvas(WIDTH, 3.6) as (figure, svg):
+    shown = [np.vstack([shape.points for shape in view.shapes]) for view in views]
+    with canvas(WIDTH, panel_height(shown, WIDTH)) as (figure, svg):
         for k, view in enumerate(views):
             axes = figure.add_subplot(1, len(views), k + 1)
             for shape in view.shapes:

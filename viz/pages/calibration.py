@@ -19,6 +19,7 @@ from viz.figures.plots import Curve, Level
 from viz.pages.page import render
 from viz.pages.posterior import open_values
 
+SPOKEN = 3  # values that a headline still has room for
 OPEN = 4  # figures of curves that are not folded away
 BELOW = 0.1  # of chi-squared: less is the roughness of contacts that fall between two steps or not
 CHI2_95 = 3.841458820694124  # 1.96^2, of chi-squared with one degree of freedom
@@ -190,15 +191,23 @@ def _correlation(c: Calibration, names: list[str]) -> Figure:
 
 
 def headline(c: Calibration) -> Headline:
-    """How many parameters are determined, and what the held-out recordings say."""
+    """The values with their intervals or, of many, how many are determined; and what the held-out recordings say."""
     known = [e for e in c.estimates if e.determined]
+    counted = f"{len(known)} of {len(c.estimates)} parameters determined"
+    values = "; ".join(f"{e.path} {_between(e)}" for e in c.estimates)
+    few = 0 < len(c.estimates) <= SPOKEN
     judged = c.held_out if c.held_out is not None else c.training
     which = "Held-out recordings" if c.held_out is not None else "The fitted recordings, none held out,"
     return Headline(
-        sentence=f"{len(known)} of {len(c.estimates)} parameters are determined by the recordings.",
-        detail=f"{which} went from {judged.before.over_noise:.3g} to {judged.after.over_noise:.3g} times the noise.",
+        sentence=f"{values if few else counted}.",
+        detail=f"{f'In brackets 95 % intervals; {counted}. ' if few else ''}{which} went from "
+        f"{judged.before.over_noise:.3g} to {judged.after.over_noise:.3g} times the noise.",
         state="pass" if len(known) == len(c.estimates) and not c.warnings else "warn",
     )
+
+
+def _between(e: Estimate) -> str:
+    return f"{e.value:.4g} {_unit(e.unit)}".rstrip() + f" ({e.low:.4g} to {e.high:.4g})"
 
 
 def _posterior(c: Calibration, drawn: Posterior) -> list[Block]:

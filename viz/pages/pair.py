@@ -7,9 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from rollover.comparison.run_pair import Pair
+from rollover.system.numbers import percent
 from viz.content.blocks import Block, Cell, Figure, Footer, Headline, Note, Section, State, Table
 from viz.content.entities import series
-from viz.content.pair_words import answer, both, detail, named, percent, value
+from viz.content.pair_words import answer, both, detail, named, relative, value
 from viz.figures import plots
 from viz.figures.plots import Curve
 from viz.pages.page import render
@@ -51,8 +52,8 @@ def _loads(found: Pair) -> list[Block]:
             "" if x.was_time is None else f"{x.was_time:.3f}",
             value(x, x.now),
             "" if x.now_time is None else f"{x.now_time:.3f}",
-            percent(x),
-            "" if x.step is None else f"{100.0 * x.step:.2g} %",
+            relative(x),
+            "" if x.step is None else percent(x.step),
             Cell(x.verdict, states.get(x.verdict, "")),
         ]
         for x in found.loads

@@ -36,7 +36,9 @@ def page(
         numbers = np.array([places[name] for name in acting], dtype=np.object_)
         rows, columns = np.repeat(numbers, len(acting)), np.tile(numbers, len(acting))
         values = np.array([np.nan if p is None else 100.0 * p for p in chances])
-        svg = heat_map(columns, rows, values, across="rival", up="true effect", label="chosen rightly, %")
+        svg = heat_map(
+            columns, rows, values, across="rival", up="true effect", label="chosen rightly, %", span=(50.0, 100.0)
+        )
         picture = Figure(svg=svg, caption="Numbers are those of the table above; a cross: not held against each other.")
         blocks.append(
             Section(
@@ -49,8 +51,9 @@ def page(
     noise: list[list[str | Cell]] = [
         [channel, spoken(sigma), describe(channel).unit] for channel, sigma in found.noise.items()
     ]
+    count = len(found.conditions)
     basis = (
-        f"{len(found.conditions)} recordings at {found.rate:g} Hz; beside the noise a model misses "
+        f"{count} recording{'' if count == 1 else 's'} at {found.rate:g} Hz; beside the noise a model may miss "
         f"{found.tolerance:.1%} of each channel's range, and each gain is off by {found.gain:.1%} (1 sigma). Each of "
         f"all effects is tested at a size of {found.size:.2%}, so that noise alone shows any of them with "
         f"{found.false_alarm:.0%}; detectable is what is then seen with {found.power:.0%}, a noncentrality of "
@@ -68,21 +71,24 @@ def page(
 
 
 def headline(found: Plan) -> Headline:
-    """How many effects would show, and how many pairs would not be told apart."""
+    """How many effects would show, how many pairs would be told apart, and which test would tell the others."""
     seen = [e for e in found.effects if e.least is not None]
     confused = {frozenset((p.effect, p.rival)) for p in found.confused()}
     pairs = {frozenset((p.effect, p.rival)) for p in found.pairs}
     apart = len(pairs) - len(confused)
+    plural = "" if len(pairs) == 1 else "s"
+    told = f", {apart} of {len(pairs)} pair{plural} told apart with {found.told_apart:.0%} or more" if pairs else ""
+    best = [a.best.says() for a in found.next_tests if a.best is not None]
     return Headline(
-        sentence=f"{len(seen)} of {len(found.effects)} effects would show in these drops.",
-        detail=f"{apart} of {len(pairs)} pairs are told apart with {found.told_apart:.0%} or more.",
+        sentence=f"{len(seen)} of {len(found.effects)} effects would show in these drops{told}.",
+        detail=f"Next: {best[0]}." if best else "",
         state="warn" if confused or len(seen) < len(found.effects) else "pass",
     )
 
 
 def _strengths(found: Plan) -> Table:
     rows = [_strength(k, e) for k, e in enumerate(found.effects, 1)]
-    columns = ["", "effect", "parameter", "detectable from", "unit", "usually", "seen then with"]
+    columns = ["", "effect", "parameter", "detectable from", "unit", "usual strength", "seen then with"]
     return Table(columns=columns, rows=rows, numeric=(0, 3, 5, 6))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rollover.system.numbers import percent
 from viz.content.blocks import (
     Block,
     Cell,
@@ -34,7 +35,7 @@ FIRST = {
     "place_right": "place right",
 }
 LINES = {"by_strength": "signal to noise", "by_noise": "noise, share of range", "by_recordings": "recordings"}
-KINDS = {"unexplained": "unexplained", "near": "a near relative", "wrong": "a wrong name", "missed": "nothing"}
+KINDS = {"unexplained": "unexplained", "near": "a near name", "wrong": "a wrong name", "missed": "nothing"}
 
 
 def page(account: Mapping[str, Any], *, command: str, versions: Mapping[str, str]) -> str:
@@ -65,9 +66,9 @@ def headline(summary: Mapping[str, Any]) -> Headline:
         [f"{_fraction(seen)} single effects were detected, {right} of them named alone and right"] if seen["of"] else []
     )
     parts += [f"{_fraction(alarms)} cases without an effect were false alarms"] if alarms["of"] else []
-    detail = [f"{len(failed)} diagnoses failed"] if failed else []
+    detail = [f"{len(failed)} diagnos{'is' if len(failed) == 1 else 'es'} failed"] if failed else []
     if alarms["of"]:
-        detail.append(f"with {alarms['of']} such cases the rate of false alarms is at most {_percent(alarms['high'])}")
+        detail.append(f"with {alarms['of']} such cases the rate of false alarms is at most {percent(alarms['high'])}")
     state: State = "fail" if failed else ""
     if not failed and alarms["of"]:
         state = "warn" if alarms["high"] > WRONG else "pass"
@@ -105,7 +106,7 @@ def _false_alarms(summary: Mapping[str, Any]) -> list[Block]:
     if p["p_value"] is not None:
         text = f"p-values where nothing was, against the uniform distribution: KS {p['statistic']:.3f} over {p['of']}"
         blocks.append(Note(text=f"{text}, p = {p['p_value']:.2g}."))
-    return [Section(title="Where nothing was", blocks=blocks)]
+    return [Section(title="Cases without an effect", blocks=blocks)]
 
 
 def _confusion(summary: Mapping[str, Any]) -> list[Block]:
@@ -126,7 +127,7 @@ def _confusion(summary: Mapping[str, Any]) -> list[Block]:
         Figure(svg=confusion(table, _right), caption=caption),
         Details(summary="As a list", blocks=[listed]),
     ]
-    return [Section(title="What was taken for what", blocks=blocks)]
+    return [Section(title="Confusion matrix", blocks=blocks)]
 
 
 def _groups(summary: Mapping[str, Any]) -> list[Block]:
@@ -138,7 +139,7 @@ def _groups(summary: Mapping[str, Any]) -> list[Block]:
                 group.replace("to inf", "and more"),
                 str(line["cases"]),
                 *(_fraction(line[part]) for part in ("detected", "first", "in_set", "alone")),
-                "" if line["parameter_error"] is None else _percent(line["parameter_error"]),
+                "" if line["parameter_error"] is None else percent(line["parameter_error"]),
                 _fraction(line["coverage"]),
             ]
             for group, line in sorted(summary[key].items(), key=lambda item: _place(item[0]))
@@ -173,7 +174,7 @@ def _values(summary: Mapping[str, Any]) -> list[Block]:
     outside = summary["outside"]
     if error["of"]:
         rows.append(
-            ("error of the values", f"median {_percent(error['median'])}, 9 of 10 below {_percent(error['p90'])}")
+            ("error of the values", f"median {percent(error['median'])}, 9 of 10 below {percent(error['p90'])}")
         )
     if held["of"]:
         gain = f"median ratio after / before {held['median_ratio']:.3g} over {held['of']} cases, {held['worse']} worse"
@@ -236,10 +237,6 @@ def _share(name: str, found: Mapping[str, Any]) -> Share:
 
 def _fraction(found: Mapping[str, Any]) -> str:
     return f"{found['hits']} of {found['of']}" if found["of"] else ""
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
 
 
 def _listed(names: Sequence[str]) -> str:

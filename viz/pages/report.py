@@ -17,6 +17,7 @@ from rollover.assessment.stand_results import findings
 from rollover.dynamics.result import Run
 from rollover.spec.estimates import in_words as estimated
 from rollover.spec.stand import TiltTable
+from rollover.system.numbers import brief, percent
 from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Pairs, Section, State, Table
 from viz.content.differences import differences_section
 from viz.content.entities import series
@@ -90,10 +91,10 @@ def headline(
         parts.append("convergence was not examined")
     else:
         word = "converged" if change <= CONVERGED else "not converged"
-        parts.append(f"{word}: half the step changes it by {_percent(change)}")
+        parts.append(f"{word}: half the step changes it by {percent(change)}")
         unsure = unsure or change > CONVERGED
     if peak.scatter is not None:
-        parts.append(f"{peak.starts} neighbouring starts scatter by {_percent(peak.scatter)}")
+        parts.append(f"{peak.starts} neighbouring starts scatter by {percent(peak.scatter)}")
     missed = [row for row in rows if row.verdict == "not met"]
     if missed:
         parts.append("not met: " + ", ".join(row.requirement.name for row in missed))
@@ -140,7 +141,7 @@ def _peaks(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
     rows: list[list[str | Cell]] = []
     for p in shown:
         s = series(p.channel)
-        change: str | Cell = "" if p.half_step_change is None else _percent(p.half_step_change)
+        change: str | Cell = "" if p.half_step_change is None else percent(p.half_step_change)
         if p.half_step_change is not None and p.half_step_change > CONVERGED:
             change = Cell(f"{change} !", "warn")
         row: list[str | Cell] = [title_of(p), s.unit, number(p.raw, s.factor), f"{p.raw_time:.3f}"]
@@ -148,7 +149,7 @@ def _peaks(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
         row += ["" if p.impulse is None else number(p.impulse), change]
         if ensemble:
             row += ["" if p.mean is None else number(p.mean, s.factor)]
-            row += ["" if p.scatter is None else _percent(p.scatter)]
+            row += ["" if p.scatter is None else percent(p.scatter)]
         row.append(Cell(", ".join(p.domain_flags) or within, "warn" if p.domain_flags else ""))
         rows.append(row)
     caption = (
@@ -281,7 +282,7 @@ def _ledger(run: Run) -> list[Block]:
     values = {name: 1e-3 * value for name, value in run.ledger.items() if known(value)}
     residual = run.ledger.get("residual", float("nan"))
     closed = closure(run)
-    of_all = _percent(abs(residual) / run.released) if math.isfinite(closed.end) else ""
+    of_all = percent(abs(residual) / run.released) if math.isfinite(closed.end) else ""
     share = f", {of_all} of the {joules(run.released)} released" if of_all else ""
     svg = plots.bars(values, label="energy at the end, kJ", roles={"residual": "limit"})
     caption = f"The energy ledger at the end of the run: {joules(residual)} unaccounted for{share}."
@@ -308,7 +309,7 @@ def _course(run: Run, answer: Mapping[str, Any]) -> list[Block]:
             ("Begins with", scenario.initiation.kind),
             ("Ground law", scenario.ground.law.__class__.kind),  # type: ignore[attr-defined]
             ("Step", f"{1e3 * scenario.simulation.step:g} ms, integrator {scenario.integrator}"),
-            ("Simulated", f"{run.stop_time:g} s in {run.wall_time:.2g} s"),
+            ("Simulated", f"{run.stop_time:g} s in {brief(run.wall_time)} s"),
             ("Phases", ", ".join(f"{name} from {start:.3f} s" for start, name in run.phases)),
             ("Effects switched on", ", ".join(scenario.effects) or "none"),
             ("Files beside this page", ", ".join(answer["files"])),
@@ -330,7 +331,3 @@ def series_unit(unit: str) -> tuple[str, float]:
 def title(name: str) -> str:
     """A name as a sentence begins."""
     return name[:1].upper() + name[1:]
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"

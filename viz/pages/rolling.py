@@ -35,9 +35,11 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
     )
     inputs = [[i["symbol"], i["what"], f"{i['value']:.4g}", i["unit"], i["from"]] for i in answer["inputs"]]
     steps = [[s["symbol"], s["what"], f"{s['value']:.4g}", s["unit"], s["basis"]] for s in answer["steps"]]
-    notes: list[Block] = [Note(text=said, warning=True) for said in answer["outside"]]
-    notes += [Note(text=f"{answer['source']}."), Note(text=BASIS)]
+    warnings: list[Block] = [Note(text=said, warning=True) for said in answer["outside"]]
+    if left_out := answer["effects_left_out"]:
+        warnings.append(Note(text=f"Effects were left out: {', '.join(left_out)}.", warning=True))
     blocks: list[Block] = [
+        *warnings,
         Section(
             title="Positions",
             blocks=[
@@ -55,7 +57,7 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
             title="Steps",
             blocks=[Table(columns=("symbol", "what", "value", "unit", "basis"), rows=steps, numeric=(2,))],
         ),
-        Section(title="In words", blocks=notes),
+        Section(title="In words", blocks=[Note(text=f"{answer['source']}."), Note(text=BASIS)]),
     ]
     return render(
         title=answer["vehicle"],

@@ -35,9 +35,7 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
     found = findings(answer["tests"])
     bad = answer["verdict"] == "not met"
     head = Headline(
-        sentence=f"The static sequence is {answer['verdict']}."
-        if answer["verdict"] != "no verdict"
-        else "The static sequence has no verdict.",
+        sentence=_answer(answer),
         detail=f"{answer['elements']} elements, {answer['segments']} to a member; feet: {answer['base']}.",
         state="fail" if bad else "warn" if answer["warnings"] else "pass" if answer["verdict"] == "met" else "",
     )
@@ -63,6 +61,23 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
         blocks=blocks,
         footer=Footer(command=command, scenario_hash=answer["scenario_hash"], versions=answer["versions"]),
     )
+
+
+def _answer(answer: Mapping[str, Any]) -> str:
+    """How many requirements are met, and how near the frame came to the clearance zone."""
+    verdicts = [row["verdict"] for row in answer["criteria"]]
+    met, of = verdicts.count("met"), len(verdicts)
+    said = f"All {of} requirements are met" if met == of else f"{met} of {of} requirements are met"
+    away = [e["zone_distance"] for e in answer["tests"] if e.get("zone_distance") is not None]
+    if not verdicts:
+        said = "The static sequence has no verdict"
+    if not away:
+        return f"{said}."
+    least = 1e3 * min(away)
+    near = (
+        f"least clearance {least:.0f} mm" if least > 0.0 else f"a member enters the clearance zone by {-least:.0f} mm"
+    )
+    return f"{said}; {near}."
 
 
 def _curves(done: list[Mapping[str, Any]]) -> Figure:

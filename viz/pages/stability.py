@@ -40,7 +40,8 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
     below = least["balance_deg"] < limit["limit_deg"]
     word = "below" if below else "not below"
     head = Headline(
-        sentence=f"It stands on {least['balance_deg']:.1f} degrees at least, at heading {least['heading_deg']:g}.",
+        sentence=f"It stands on slopes of up to {least['balance_deg']:.1f} degrees, whichever way it faces; "
+        f"the weakest heading is {least['heading_deg']:g} degrees.",
         detail=f"This is {word} the {limit['limit_deg']:g} degrees asked of narrow tractors ({limit['confidence']}).",
         state="warn" if below else "",
     )
@@ -74,10 +75,9 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
             numeric=range(1, 5),
         )
         blocks.append(Section(title="What parts cost", blocks=[table, Note(text=LOSSES)]))
-    notes: list[Block] = [Note(text=WHAT)]
     if answer["effects_left_out"]:
-        notes.append(Note(text=f"Effects were left out: {', '.join(answer['effects_left_out'])}.", warning=True))
-    blocks.append(Section(title="In words", blocks=notes))
+        blocks.insert(0, Note(text=f"Effects were left out: {', '.join(answer['effects_left_out'])}.", warning=True))
+    blocks.append(Section(title="In words", blocks=[Note(text=WHAT)]))
     return render(
         title=answer["vehicle"],
         subtitle="Static stability",

@@ -78,7 +78,11 @@ def _headline(account: Mapping[str, Any]) -> Headline:
             failed += f"{_percent(e['least'])} to {_percent(e['most'])} of all, as the failed ones lie on either side. "
     else:
         low, high = (f"{first[key] * factor:.4g}" for key in ("least", "largest"))
-        sentence = f"{first['name']} goes from {low} to {high} {unit}."
+        known = "" if unit == "1" else f" {unit}"
+        sentence = f"{first['name']} goes from {low} to {high}{known}"
+        if (b := first["beyond_limit"]) is not None:
+            sentence += f", {b['beyond']} {b['limit'] * factor:.4g}{known} in {b['hits']} of {b['cases']} cases"
+        sentence += "."
     return Headline(
         sentence=sentence, detail=f"{failed}{_sentence(account['meaning_of_quantiles'])}{worth}", state=state
     )

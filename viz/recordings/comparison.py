@@ -111,8 +111,9 @@ def sentences(found: Misfit) -> list[str]:
         )
     if found.clock is not None:
         c = found.clock
+        way = "late" if c.offset >= 0.0 else "early"
         lines.append(
-            f"the recording's clock agrees best when taken {1e3 * c.offset:+.3g} +- {1e3 * c.sigma:.2g} ms late; "
+            f"the recording's clock agrees best when taken {1e3 * abs(c.offset):.3g} +- {1e3 * c.sigma:.2g} ms {way}; "
             f"setting it, which was not done, would remove {100.0 * c.gain:.0f} % of the squared residual"
         )
         if c.at_limit:

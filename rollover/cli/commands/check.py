@@ -68,9 +68,12 @@ def _each(name: str, profile: Described | None) -> list[str]:
 
 
 def _document(name: str) -> dict[str, Any]:
+    from rollover import scenario as scenarios
     from rollover.cli import catalogue
+    from rollover.spec import document
 
-    return {"is": catalogue.check(name)}
+    what = catalogue.check(name)
+    return {"is": what, "notes": list(scenarios.load(document.find(name)).idle) if what == "scenario" else []}
 
 
 def _is_recording(name: str, profile: Described | None) -> bool:
@@ -158,6 +161,8 @@ def _print(name: str, row: dict[str, Any]) -> None:
 
     if row["is"] != "recording":
         tell(f"{name}: {row['is']}, valid")
+        for note in row["notes"]:
+            tell(f"  note: {note}")
         return
     from rollover.recording.checks import when
 

@@ -216,12 +216,19 @@ def with_settings(chosen: Scenario, set_: list[str] | None) -> Scenario:
 
 
 def scenario_with(name: str, set_: list[str] | None) -> tuple[Path, Scenario]:
-    """File of the scenario of that name, and the scenario with the values of `--set`. Raises `InputError`."""
+    """File of the scenario of that name, and the scenario with the values of `--set`. Raises `InputError`.
+
+    Effects that nothing feels there are said.
+    """
     from rollover import scenario
+    from rollover.cli import console
     from rollover.spec import document
 
     path = document.find(name)
-    return path, with_settings(scenario.load(path), set_)
+    chosen = with_settings(scenario.load(path), set_)
+    for line in chosen.idle:
+        console.say(f"{path}: {line}")
+    return path, chosen
 
 
 def hand_out(

@@ -78,6 +78,8 @@ def rops_(
     except ArithmeticError as e:
         console.say(f"{name}: {e}")
         raise typer.Exit(FAILED) from None
+    if clamped and not found.rops.mounts:
+        console.say(f"{name}: --clamped changes nothing: the frame has no mounts, and feet are held still as they are")
     answer = account(found, about)
     words = [] if mass is None else ["--mass", f"{mass:g}"]
     words += ["--segments", str(segments)] if segments != SEGMENTS else []

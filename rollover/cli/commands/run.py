@@ -72,8 +72,6 @@ def run(
     from rollover.spec import document
 
     path, chosen = scenario_with(scenario, set_)
-    for line in chosen.idle:
-        console.say(f"{path}: {line}")
     compiles = not is_warm(chosen.integrator)
     if compiles:
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")

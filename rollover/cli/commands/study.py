@@ -72,6 +72,8 @@ def study(
     path = studies.find(name)
     ready = prepared(path, out, changes=settings(set_ or []), given=set_ or [], scheduler=scheduler, force=force)
     chosen = ready.study
+    for line in chosen.scenario.idle:
+        console.say(f"{path}: scenario: {line}")
     way = Way(
         workers=workers,
         scheduler=scheduler,
@@ -133,7 +135,7 @@ def sentences(account: dict[str, Any]) -> list[str]:
             low, value, high = (readable(q[key], each["unit"]) for key in ("low", "value", "high"))
             lines.append(f"  {100.0 * q['q']:5.4g} %  {value:>9}   ({low} to {high})")
         if (e := each["exceedance"]) is not None:
-            limit = readable(e["limit"], each["unit"])
+            limit = f"{readable(e['limit'], each['unit'])} {unit.removeprefix('1')}".rstrip()
             span = f"({100.0 * e['low']:.3g} to {100.0 * e['high']:.3g} %)"
             lines.append(f"  probability {e['beyond']} {limit}: {100.0 * e['probability']:.3g} %  {span}")
             if e["failed"]:
@@ -142,7 +144,8 @@ def sentences(account: dict[str, Any]) -> list[str]:
                 low = f"  with {e['failed']} failed cases as not {e['beyond']}: {none}"
                 lines.append(f"{low}, as {e['beyond']}: {every}  {span}")
         if (e := each["beyond_limit"]) is not None:
-            limit, failed = readable(e["limit"], each["unit"]), f", {e['failed']} failed" if e["failed"] else ""
+            limit = f"{readable(e['limit'], each['unit'])} {unit.removeprefix('1')}".rstrip()
+            failed = f", {e['failed']} failed" if e["failed"] else ""
             lines.append(f"  {e['beyond']} {limit}: {e['hits']} of {e['cases']} cases{failed}")
         for s in each["sobol"]:
             total = f"total {s['total']:.2f} +- {s['total_half_width']:.2f}"

@@ -61,7 +61,10 @@ def comparison(found: Sequence[Misfit], folder: str) -> None:
             out.print(f"{each.zero.sentence[0].upper()}{each.zero.sentence[1:]}: set to it.", style="yellow")
         if each.clock is not None:
             late, sigma, gain = 1e3 * each.clock.offset, 1e3 * each.clock.sigma, 100.0 * each.clock.gain
-            out.print(f"Clock {late:+.3g} +- {sigma:.2g} ms late; setting it (not done) would remove {gain:.0f} %.")
+            way = "late" if late >= 0.0 else "early"
+            out.print(
+                f"Clock {abs(late):.3g} +- {sigma:.2g} ms {way}; setting it (not done) would remove {gain:.0f} %."
+            )
         for channel, why in each.skipped.items():
             out.print(f"{channel}: left out, {why}", style="yellow")
         for note in each.notes:
@@ -165,8 +168,7 @@ def stability(answer: Mapping[str, Any], folder: str) -> None:
     for part in answer["losses"]:
         share, was, now = 100.0 * part["share"], part["without_deg"], part["with_deg"]
         out.print(f"{part['part']}: takes {share:.1f} % across the slope, {was:.2f} -> {now:.2f} deg")
-    if answer["effects_left_out"]:
-        out.print(f"Effects were left out: {', '.join(answer['effects_left_out'])}.", style="yellow")
+    _left_out(answer)
     least, limit = answer["least"], answer["code_6"]
     verdict = "below" if least["balance_deg"] < limit["limit_deg"] else "not below"
     out.print(
@@ -175,6 +177,11 @@ def stability(answer: Mapping[str, Any], folder: str) -> None:
         style="bold",
     )
     out.print(f"Results: {folder}")
+
+
+def _left_out(answer: Mapping[str, Any]) -> None:
+    if answer["effects_left_out"]:
+        terminal.out().print(f"Effects were left out: {', '.join(answer['effects_left_out'])}.", style="yellow")
 
 
 def rolling(answer: Mapping[str, Any], folder: str) -> None:
@@ -192,6 +199,7 @@ def rolling(answer: Mapping[str, Any], folder: str) -> None:
     out.print(table)
     for said in answer["outside"]:
         out.print(said, style="yellow")
+    _left_out(answer)
     out.print(
         f"{answer['verdict'].capitalize()} rolling (version {answer['version']}): {answer['sentence']}.", style="bold"
     )

@@ -10,6 +10,7 @@ from rich.table import Table
 
 from rollover.cli.console import terminal
 from rollover.system.errors import excerpt
+from rollover.system.numbers import brief, percent
 
 if TYPE_CHECKING:
     from rollover.assessment.criteria import Criterion
@@ -30,7 +31,6 @@ def report(
     """The answer of a run on standard output; what took part of its time to compile tells no speed."""
     from rollover.assessment.criteria import in_words
     from rollover.assessment.ledger import closure
-    from rollover.assessment.loads import unconverged
     from rollover.assessment.shipped import origin
     from rollover.spec.estimates import in_words as estimated
 
@@ -40,8 +40,8 @@ def report(
         out.print(f"{made_from.in_words}.", style="yellow")
     if run.status == "done":
         speed = (run.stop_time - float(run.recording.time[0])) / run.wall_time if run.wall_time > 0.0 else 0.0
-        pace = "most of it compiling, once" if compiled else f"{speed:.2g} x real time"
-        out.print(f"{run.stop_time:g} s simulated in {run.wall_time:.2g} s ({pace})")
+        pace = "most of it compiling, once" if compiled else f"{brief(speed)} x real time"
+        out.print(f"{run.stop_time:g} s simulated in {brief(run.wall_time)} s ({pace})")
     else:
         out.print(f"FAILED: {run.sentence}", style="bold red")
     if run.status == "done" and run.sentence:
@@ -55,8 +55,7 @@ def report(
         out.print(_criteria(rows))
         for sentence in in_words(rows):
             out.print(sentence)
-    if unsure := unconverged(peaks):
-        out.print(f"{unsure[0].upper()}{unsure[1:]}.", style="bold yellow")
+    _convergence(out, peaks)
     closed = closure(run)
     if closed.is_wide:
         out.print(f"{closed.warning[0].upper()}{closed.warning[1:]}.", style="bold yellow")
@@ -75,6 +74,15 @@ def report(
     if half is not None and half["status"] != "done":
         out.print(f"At half the step the run failed: {half['sentence']}", style="yellow")
     out.print(f"Results: {folder}")
+
+
+def _convergence(out: Console, peaks: Sequence[PeakLoad]) -> None:
+    from rollover.assessment.loads import converged, unconverged
+
+    if unsure := unconverged(peaks):
+        out.print(f"{unsure[0].upper()}{unsure[1:]}.", style="bold yellow")
+    elif settled := converged(peaks):
+        out.print(f"{settled[0].upper()}{settled[1:]}.")
 
 
 def _stand(out: Console, run: Run) -> None:
@@ -112,7 +120,7 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
     for peak in peaks:
         if peak.raw == 0.0:
             continue  # a wheel that never touched
-        change = "-" if peak.half_step_change is None else f"{100.0 * peak.half_step_change:.2g} %"
+        change = "-" if peak.half_step_change is None else percent(peak.half_step_change)
         table.add_row(
             peak.channel + (" *" if peak.domain_flags else ""),
             terminal.READABLE.get(peak.unit, (peak.unit, 1.0))[0],
@@ -122,7 +130,7 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
             "-" if peak.filtered_time is None else f"{peak.filtered_time:.3f}",
             "-" if peak.impulse is None else f"{peak.impulse:.4g}",
             change,
-            *([terminal.readable(peak.mean, peak.unit), f"{100.0 * (peak.scatter or 0.0):.2g} %"] if ensemble else []),
+            *([terminal.readable(peak.mean, peak.unit), percent(peak.scatter or 0.0)] if ensemble else []),
         )
     return table
 
@@ -150,7 +158,7 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
         for a, d in changed:
             unit = terminal.READABLE.get(d.unit, (d.unit, 1.0))[0]
             change = "-" if d.change is None else f"{100.0 * d.change:+.3g} %"
-            allowed = "-" if d.tolerance is None else f"{100.0 * d.tolerance:.2g} %"
+            allowed = "-" if d.tolerance is None else percent(d.tolerance)
             was, now = (terminal.readable(v, d.unit) for v in (d.was, d.now))
             loads.add_row(a.scenario, d.load, d.filter, unit, was, now, change, allowed)
         out.print()

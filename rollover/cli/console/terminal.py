@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rollover.system.errors import excerpt, sentence
+from rollover.system.numbers import brief
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -103,7 +104,7 @@ def counting(what: str) -> Iterator[Callable[..., None]]:
 
 def _state(simulated: float, wall: float, start: float, end: float) -> str:
     speed = (simulated - start) / wall if wall > 0.0 else 0.0
-    return f"{simulated:.2f} of {end:g} s, {speed:.2g} x real time"
+    return f"{simulated:.2f} of {end:g} s, {brief(speed)} x real time"
 
 
 def readable(value: float | None, unit: str) -> str:

@@ -35,7 +35,7 @@ NOTHING: Mapping[str, Array] = MappingProxyType({})
 
 @dataclass(frozen=True, kw_only=True)
 class Signal:
-    """One channel of a recording: where it has values, its noise (SI), colour, and range."""
+    """One channel of a recording: where it has values, its noise (SI), autocorrelation, and range."""
 
     channel: str
     rows: NDArray[np.int64]
@@ -51,7 +51,7 @@ class Signal:
     zero_error: float = 0.0  # standard error of that; 0: none was
     weight: Array | None = None  # (n,), below 1 where the model itself is not sure
     level: Array | None = None  # (n,), noise over `noise` where it grows with the value
-    at_rest: tuple[float, tuple[float, ...]] | None = None  # noise and colour of its quiet stretches, once told
+    at_rest: tuple[float, tuple[float, ...]] | None = None  # noise and autocorrelation of quiet stretches
 
     def cut(self, inside: NDArray[np.bool_]) -> Signal:
         """The samples that are `inside` (n,)."""
@@ -60,7 +60,7 @@ class Signal:
 
     @property
     def quiet(self) -> tuple[float, tuple[float, ...]]:
-        """Noise and colour of its quiet stretches; those that are held before these are told."""
+        """Noise and autocorrelation of its quiet stretches; those that are held before these are told."""
         return self.at_rest or (self.noise, self.ar)
 
     @property
@@ -78,7 +78,7 @@ class Signal:
 
 @dataclass(frozen=True, kw_only=True)
 class _Inside:
-    """Samples (n,) of a stack: the first and the last of the signal of each, and the least leap from each."""
+    """Samples (n,) of a stack: the first and the last of the signal of each, and the least jump from each."""
 
     first: NDArray[np.int64]
     last: NDArray[np.int64]
@@ -201,7 +201,7 @@ class Dataset:
         return self.whitened(self.values)
 
     def discontinuities(self, raw: Array, predicted: Mapping[str, Array] = NOTHING) -> NDArray[np.int64]:
-        """Samples (stacked) about which a prediction leaps, and means within which it is `predicted` to."""
+        """Samples (stacked) about which a prediction jumps, and means within which it is `predicted` to."""
         own = self._inside
         found: NDArray[np.bool_] = near_discontinuity(raw, own.least, own.first, own.last)
         for s, part in self.spans():
@@ -215,7 +215,7 @@ class Dataset:
 
     @cached_property
     def _inside(self) -> _Inside:
-        """Where the signals of the stack begin and end, and what is a leap in each."""
+        """Where the signals of the stack begin and end, and what is a jump in each."""
         spans = self.spans()
         first = np.concatenate([np.full(p.stop - p.start, p.start) for _, p in spans])
         last = np.concatenate([np.full(p.stop - p.start, p.stop - 1) for _, p in spans])
@@ -224,9 +224,9 @@ class Dataset:
         return _Inside(first=first, last=last, least=least)
 
     def masked(self, raw: Array, discontinuities: NDArray[np.int64]) -> Array:
-        """Predicted samples (stacked, SI) about a leap, moved towards the measured ones within their neighbours.
+        """Predicted samples (stacked, SI) about a jump, moved towards the measured ones within their neighbours.
 
-        On which side of a leap a sample lies is decided by clocks, not by physics.
+        On which side of a jump a sample lies is decided by clocks, not by physics.
         """
         if not discontinuities.size:
             return raw
@@ -347,7 +347,7 @@ def _oversampling(recording: Recording, channel: str) -> int:
 
 
 def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float, tuple[float, ...]]:
-    """Noise (1 sigma) and its colour, from the misfit; from the channel itself where that shows clearly less."""
+    """Noise (1 sigma) and autocorrelation, from the misfit; from the channel itself where that shows clearly less."""
     if values.size < LENGTH:
         return (stated if stated is not None else noise_from_differences(residual)), ()
     best, other = (_floor(v) for v in (residual, values))

@@ -101,7 +101,7 @@ def _is_chance(inconsistency: Inconsistency) -> bool:
 
 
 def without_inconsistent(every: Sequence[Dataset], inconsistencies: Sequence[Inconsistency]) -> list[Dataset]:
-    """The evidence without channels that are misread by a slip, nor recordings of nothing else."""
+    """The evidence without channels that are misread by an error of unit or sign, nor recordings of nothing else."""
     aside = {(inconsistency.dataset.name, inconsistency.signal.channel) for inconsistency in inconsistencies}
     left = [replace(e, signals=tuple(s for s in e.signals if (e.name, s.channel) not in aside)) for e in every]
     return [e for e in left if e.signals] if aside else list(every)

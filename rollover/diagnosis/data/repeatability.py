@@ -92,7 +92,7 @@ def _difference(a: Dataset, b: Dataset, channel: str) -> float | None:
         if inside.sum() < max(TUNING.least_samples, 0.8 * min(t.size, u.size)):
             return np.inf
         apart = (x.values[inside] - np.interp(t[inside] - shift, u, y.values)) ** 2
-        # a leap lies between two samples of each, and not at the same place
+        # a jump lies between two samples of each, and not at the same place
         return float(np.mean(np.sort(apart)[: apart.size - TUNING.ignored_samples]))
 
     wide = max(SETTINGS.fit.time_shift.search_width * float(np.hypot(a.shift_prior, b.shift_prior)), TUNING.most_late)

@@ -127,7 +127,7 @@ class Simulations:
     def predicted_with_jumps(
         self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float
     ) -> Array | None:
-        """Stacked prediction of recording r, SI, with its leaps as they are; not remembered. None if it fails."""
+        """Stacked prediction of recording r, SI, with its jumps as they are; not remembered. None if it fails."""
         found = self._made(r, candidates, x, shift)
         return None if found is None else found[0]
 
@@ -161,9 +161,9 @@ class Simulations:
         return time_derivative(self.dataset[r], changes, shift, raw, later, both=self.effort.is_ensemble)
 
     def moved(self, r: int, before: Point, after: Point, shift: float, slope: Array | None = None) -> Array | None:
-        """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
+        """How the prediction of recording r differs between two points, whitened; nothing where either jumps.
 
-        A leap that moves past a sample is no slope, and what is forgiven there follows the measurement. With `slope`,
+        A jump that moves past a sample is no slope, and what is forgiven there follows the measurement. With `slope`,
         dy/dtau (n,) before, SI, the two are compared as a clock would have them, see `clock_aligned_difference`.
         """
         first, last = self.raw(r, *before, shift), self.raw(r, *after, shift)

@@ -36,7 +36,7 @@ TUNING = SETTINGS.fit.ensemble_mean
 def refined_under_scatter(problem: Problem, part: Step) -> Step:
     """A step under the scatter of runs with its explanation, moved to where the mean of them is met best (D8).
 
-    Slopes beside a leap lead astray, and so may clocks that a wrong place has bent: it is moved again until a step
+    Slopes beside a jump lead astray, and so may clocks that a wrong place has bent: it is moved again until a step
     would gain no more than chance, or little of what is left, and of all places on the way the one is kept whose mean
     is met best. As it was if nothing can be simulated there; where runs do not scatter too. Its rivals are not put
     under that scatter: that costs runs, see `Step.again`.

@@ -1,7 +1,7 @@
 """Slopes among runs that differ by chance: over both sides of a point, and over as wide a step as shows clearly more.
 
 Between two runs lies what the parameter does and what chance does. Over a narrow step that is mostly chance, which
-squares make look like a strong slope: steps too short, and intervals too narrow. Where a run leaps to another course on
+squares make look like a strong slope: steps too short, and intervals too narrow. Where a run jumps to another course on
 one side, the other side alone tells what the parameter does. Where nothing is left to chance, as in drops, a narrow
 step is the better one, see `step_reduced`.
 
@@ -74,7 +74,7 @@ def adaptive_difference(
         fd_step *= 2.0
     whole = _central_difference(sides)
     (quiet, over), (loud, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
-    # nothing at all on one side is where an effect ends, and no leap
+    # nothing at all on one side is where an effect ends, and no jump
     discontinuities = (
         physical and widest > 0.0 and 0.0 < TUNING.discontinuity_ratio * float(quiet @ quiet) < float(loud @ loud)
     )
@@ -97,7 +97,7 @@ def ensemble_sum_of_squares(e: Dataset) -> float:
 
 
 def stencil(at: Point, k: int, fd_step: float) -> list[list[float]]:
-    """Coordinates a nudge of the k-th one to either side, within its range."""
+    """Coordinates a step of the k-th one to either side, within its range."""
     step, value = fd_step_of(at[0], k, fd_step), at[1][k]
     return [moved_to(at, k, end) for end in (max(value - step, 0.0), min(value + step, 1.0)) if end != value]
 
@@ -123,7 +123,7 @@ def _needs_wider_step(
     fd_step: float,
     widest: float,
 ) -> bool:
-    """Whether chance hides what a nudge does, and twice as much may be taken."""
+    """Whether chance hides what a step does, and twice as much may be taken."""
     if owner_of(candidates, k)[0].kind == "sensor" or 2.0 * fd_step > widest:
         return False
     whole = _central_difference(sides)
@@ -145,7 +145,7 @@ def difference_beyond_chance(e: Dataset, d: Array, chance: float) -> Array:
 def time_derivative(
     e: Dataset, changes: Mapping[str, object], shift: float, raw: Array, later: float, *, both: bool
 ) -> Array:
-    """dy/dtau (n,) of a recording, SI, `raw` y at `shift`; none across a leap, on whichever side a sample was and is.
+    """dy/dtau (n,) of a recording, SI, `raw` y at `shift`; none across a jump, on whichever side a sample was and is.
 
     Over `later` (s), to both sides where that costs no run.
     """
@@ -204,7 +204,7 @@ def fd_step_of(candidates: Sequence[Candidate], k: int, fd_step: float) -> float
 def beside(
     use: Sequence[int], candidates: Sequence[Candidate], x: Sequence[float], fd_step: float, first: int = 0
 ) -> Iterator[tuple[int, Sequence[Candidate], Sequence[float]]]:
-    """(recording, candidates, x) of a place and of those a nudge to either side of it, of the recordings in `use`.
+    """(recording, candidates, x) of a place and of those a step to either side of it, of the recordings in `use`.
 
     To the sides of its coordinates from the `first` on.
     """

@@ -52,7 +52,7 @@ def shifts_from_contact(
 
 
 def _by_contact(problem: Problem, r: int, *, beside: Point) -> float | None:
-    # leaps as they are: these are what tells the time
+    # jumps as they are: these are what tells the time
     e = problem.dataset[r]
     at = _first_contact(problem, r, partial(problem.predicted_with_jumps, r, *beside))
     known = e.recording.clock.zero != "unknown"

@@ -30,9 +30,9 @@ TUNING = SETTINGS.forward.averaging
 class Averaged:
     """A simulator at several stamps for each mean, `starts` (bins,) where those of each begin; predicts the means.
 
-    `inner` tells of no leaps from stamp to stamp, see `DropSimulator`: their means would say nothing.
+    `inner` tells of no jumps from stamp to stamp, see `DropSimulator`: their means would say nothing.
     Where fewer than all that are in a mean are simulated, it also says under `DISCONTINUITY_IN` and the channel's name
-    how far that leaps within or beside each mean: of how many of its samples it has leapt already is not known then.
+    how far that jumps within or beside each mean: of how many of its samples it has jumped already is not known then.
     """
 
     inner: Simulator

@@ -1,6 +1,6 @@
-"""Compiled: leaps of a prediction from one sample to the next, and what is forgiven about them.
+"""Compiled: jumps of a prediction from one sample to the next, and what is forgiven about them.
 
-On which side of a leap a sample lies is decided by clocks, not by physics.
+On which side of a jump a sample lies is decided by clocks, not by physics.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from ground.compiled import compiled, leaf
 from rollover.diagnosis.settings import SETTINGS
 
 DISCONTINUITY_IN = (
-    "leap in "  # before the name of a channel: how far it leaps about each sample, or within each mean, SI
+    "leap in "  # before the name of a channel: how far it jumps about each sample, or within each mean, SI
 )
 TUNING = SETTINGS.forward.discontinuities
 # compiled functions read globals
 DISCONTINUITY = TUNING.sample_ratio
 WITHIN = TUNING.mean_ratio
-SHOWS = TUNING.visible_step  # times the noise, from which on a step may be a leap
-LARGE = TUNING.large_jump  # times the noise: a leap whose instant is not believed to the sample
-BESIDE = TUNING.neighbours  # samples to either side, between whose values one about a leap may be
+SHOWS = TUNING.visible_step  # times the noise, from which on a step may be a jump
+LARGE = TUNING.large_jump  # times the noise: a jump whose instant is not believed to the sample
+BESIDE = TUNING.neighbours  # samples to either side, between whose values one about a jump may be
 
 
 @compiled
 def near_discontinuity(y: Any, least: Any, first: Any, last: Any) -> Any:
-    """Whether a stack y (n,) leaps about each sample, over two samples by more than `least` (n,) from the first.
+    """Whether a stack y (n,) jumps about each sample, over two samples by more than `least` (n,) from the first.
 
     `first` and `last` (n,) are the ends of the signal of each sample.
     """
@@ -56,7 +56,7 @@ def largest_jump_nearby(times: Any, jumps: Any, sizes: Any) -> Any:
 
 @leaf
 def within_means(values: Any, mean: Any, sizes: Any) -> None:
-    """How far values (n,) leap within or beside each mean, into sizes (m,); `mean` (n,) is that of each value."""
+    """How far values (n,) jump within or beside each mean, into sizes (m,); `mean` (n,) is that of each value."""
     sizes[:] = 0.0
     last = values.size - 1
     for k in range(last):
@@ -70,9 +70,9 @@ def within_means(values: Any, mean: Any, sizes: Any) -> None:
 
 @compiled
 def weights_after_discontinuities(discontinuities: Any, last: Any, orders: Any, gains: Any) -> Any:
-    """Weights (n,) of whitened samples: those after leaps, as many as the noise remembers, have `gains`, all others 1.
+    """Weights (n,) of whitened samples: those after jumps, as many as the noise remembers, have `gains`, all others 1.
 
-    A leap itself counts in full. `last`, `orders` (how many) and `gains` (n,) are those of the signal of each sample.
+    A jump itself counts in full. `last`, `orders` (how many) and `gains` (n,) are those of the signal of each sample.
     """
     found = np.ones(last.size)
     for i in discontinuities:

@@ -76,7 +76,7 @@ class DropSimulator:
     def __init__(self, scenario: Scenario, recording: Recording, *, discontinuities: bool = True) -> None:
         self.model = DropModel(scenario=scenario)
         self.recording = recording
-        self.discontinuities = discontinuities  # whether it says how far channels leap
+        self.discontinuities = discontinuities  # whether it says how far channels jump
         self._raw: dict[tuple[Any, ...], dict[str, Array]] = {}
         self._models: dict[tuple[Any, ...], DropModel] = {}
         self._tracks: dict[tuple[Any, ...], Track] = {}
@@ -131,7 +131,7 @@ class DropSimulator:
     def _discontinuities(
         self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]
     ) -> dict[str, Array]:
-        """How far channels that nothing smooths leap about each stamp, under `DISCONTINUITY_IN` and their names."""
+        """How far channels that nothing smooths jump about each stamp, under `DISCONTINUITY_IN` and their names."""
         time = self.recording.time
         instants, rows = self._track(physical, float(time[-1] - shift) if time.size else 0.0).jumps
         if not instants.size:
@@ -145,7 +145,7 @@ class DropSimulator:
         }
 
     def _edges(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
-        """Channels behind a lag or with a clock of their own: what these make of a leap lies between the rows."""
+        """Channels behind a lag or with a clock of their own: what these make of a jump lies between the rows."""
         lags, offsets, drifts = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
         found = {}
         for channel in {*lags, *offsets, *drifts} & set(self.recording.channels):

@@ -117,7 +117,7 @@ def profile_extents(
 ) -> Array:
     """How much further than by its slopes a misfit stays low, factors (p, 2) of `own` deviations down and up, >= 1.
 
-    `TWO_SIDED` deviations off, the other parameters going along, it should have risen by `TWO_SIDED`^2 phi. Leaps and
+    `TWO_SIDED` deviations off, the other parameters going along, it should have risen by `TWO_SIDED`^2 phi. Jumps and
     chance make slopes too steep: where it has clearly not, one goes on until it has, and back on a parabola. Of runs
     that scatter it is the misfit of their mean, which is rough by itself. With `sides` these alone are looked at.
     """

@@ -1,7 +1,7 @@
 """Samples that were lost, as of a contact that opens: recordings show them by themselves, no candidate makes up for it.
 
 Where the signal is small they hide in the noise, and where runs scatter they count for little. But a channel that has
-noise is not nothing to the last digit again and again, and behind its filter none leaps from one sample to the next.
+noise is not nothing to the last digit again and again, and behind its filter none jumps from one sample to the next.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TUNING = SETTINGS.inference.lost_samples
 def lost(
     names: Sequence[str], recordings: Sequence[Recording], phases: Sequence[Sequence[tuple[float, str]]]
 ) -> tuple[Place, ...]:
-    """Where channels break off: read exactly nothing for several samples, or leap as their filters let none, again."""
+    """Where channels break off: read exactly nothing for several samples, or jump as their filters let none, again."""
     found: dict[str, list[tuple[int, float, float]]] = {}
     for r, recording in enumerate(recordings):
         for channel in recording.channels:
@@ -32,7 +32,7 @@ def lost(
 
 
 def _breaks(recording: Recording, channel: str) -> Iterator[tuple[float, float]]:
-    """(start, end), s, of each run of exact zeros, and of each leap."""
+    """(start, end), s, of each run of exact zeros, and of each jump."""
     channel_trace = trace(recording, channel)
     if channel_trace is None:
         return

@@ -1,4 +1,4 @@
-"""Level and colour of the noise of each channel, from all recordings of one recorder together.
+"""Level and autocorrelation of the noise of each channel, from all recordings of one recorder together.
 
 Recordings at the same rate, behind the same filter class, share a channel's noise; each alone is too short to tell a
 long memory. First from the quiet stretches; where an explanation leaves little more than that, from all it leaves.
@@ -119,7 +119,7 @@ def with_noise_of_residuals(dataset: Sequence[Dataset], residuals: Sequence[Arra
 
 
 def _pooled_noise(members: Sequence[Member], parts: Sequence[Array], memory: Memory) -> list[NoiseEstimate]:
-    """Noise of recordings alike by what each leaves: one colour of all, and one level unless they clearly differ."""
+    """Noise of recordings alike by what each leaves: one autocorrelation, one level unless they clearly differ."""
     levels = np.array([_level(p) for p in parts])
     _, ar = memory([p / level for p, level in zip(parts, levels, strict=True)])
     # of one recorder unless they differ by more than so few samples can, each worth less for its memory
@@ -187,7 +187,7 @@ def slow_noise_margin(memory: float, count: float) -> float:
 
 
 def is_bursting(s: Signal, misfit: Array, level: float) -> bool:
-    """Whether a misfit (n,) is much less beside its bursts; digits that leap are none."""
+    """Whether a misfit (n,) is much less beside its bursts; digits that jump are none."""
     return s.step == 0.0 and level > SETTINGS.noise.outliers.burst_ratio * float(
         np.sqrt(np.mean(without_outliers(misfit) ** 2))
     )

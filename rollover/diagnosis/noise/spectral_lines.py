@@ -1,7 +1,7 @@
-"""Lines in the spectrum of what is left of a channel: a hum is no noise, however strong, and no colour explains it.
+"""Lines in the spectrum of a channel's residual: a hum is no noise, however strong, and no autoregression fits it.
 
 The periodograms of all recordings, each over its own running median times 1/ln 2, add up at a frequency to a sum that
-is Gamma(R) distributed on noise of any smooth colour; a line is where that is beyond chance at all frequencies.
+is Gamma(R) distributed on noise of any smooth spectrum; a line is where that is beyond chance at all frequencies.
 """
 
 from __future__ import annotations

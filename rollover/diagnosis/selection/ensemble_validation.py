@@ -75,7 +75,7 @@ def counted_in_full(problem: Problem, base: Fitted) -> Fitted:
 def without_unsupported_rivals(found: Step, looked: ScoreTest, spoken: float = TUNING.own_p_value) -> Step:
     """A step without rivals that nothing spoke for when looked at, by a p-value: their runs met them by chance.
 
-    What speaks for one that acts somewhere speaks for its kin; for a strong one its runs did.
+    What speaks for one that acts somewhere speaks for its family; for a strong one its runs did.
     """
     last = [f.candidates[-1] for f in found.rivals]
     spoken_for = [

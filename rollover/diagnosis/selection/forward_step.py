@@ -228,7 +228,7 @@ def _elsewhere_of(base: Fitted) -> list[tuple[float, ...]]:
 def _robust_short_fits(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[int]) -> list[Fitted]:
     """Fits to few recordings with other courses forgiven, as they stand in full.
 
-    Where runs part ways what is left in full leaps from place to place, and a fit ends at the first dip.
+    Where runs part ways what is left in full jumps from place to place, and a fit ends at the first dip.
     """
     problem, found = inquiry.problem, []
     with problem.held(heavy_tailed=True):
@@ -245,7 +245,7 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: ScoreTest) -> 
 
     Of runs that scatter those whose score is a small part of the best one's are not; what a sensor makes of them costs
     none: as many more. A part that gives way looks like several sensors at the end of their ranges, and scores less
-    than each: the two are compared with their own kind. With a leader come its kin.
+    than each: the two are compared with their own kind. With a leader comes its family.
     """
     by_start = sorted(screened, key=lambda s: s.left)[: effort.promising // 2]
     if not effort.is_ensemble:
@@ -314,7 +314,7 @@ def _run_distance(problem: Problem, some: Sequence[ResidualBlock], others: Seque
 def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitted]:
     """Fits, best first, led by the one with the fewest numbers of those that are hardly worse than the best.
 
-    Hardly worse: within a standard error, or within what leaps make the misfit rough by. Of those that are one and the
+    Hardly worse: within a standard error, or within what jumps make the misfit rough by. Of those that are one and the
     same to these recordings the one leads that asks for the more usual strength.
     """
     least = held_out(fits[0], groups).left.sum()

@@ -169,7 +169,7 @@ def promising(
 ) -> list[Candidate]:
     """Those that scored best, and of two parameters all: beside their thresholds a score tells little.
 
-    Where each costs runs, of these only the kin of what leads, and a few that move the vehicle in any case.
+    Where each costs runs, of these only the family of what leads, and a few that move the vehicle in any case.
     """
     ranked = looked.ranked(candidates)
     if effort.scored is not None:

@@ -25,7 +25,7 @@ TUNING = SETTINGS.selection.simplification
 def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     """A step and what it leaves; where that is little more than noise, its fit followed to the end; never worse.
 
-    Beside a kink, or a sample that a clock carries over a leap, or in the valley that two effects share, a fit may end
+    Beside a kink, or a sample that a clock carries over a jump, or in the valley that two effects share, a fit may end
     too early. One effect's is followed only if what it leaves is in doubt, or if it is met better with its threshold
     elsewhere.
     """

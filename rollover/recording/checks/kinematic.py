@@ -7,7 +7,7 @@ With a the accelerometer's reading, v = int a, x = int v from the first sample o
 
 for a position p and a speed u; c_2 takes a collision that is shorter than a sample. The four are tried one at a time:
 the one that leaves the others nothing to explain is found, and those that would do as well are named. Standard errors
-are those of the same fit to noise drawn with each channel's own level and colour.
+are those of the same fit to noise drawn with each channel's own level and autocorrelation.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def _columns(time: Array, a: Array, order: int) -> tuple[dict[str, Array], Array
 def _collision(time: Array, columns: Array, left: Array, order: int) -> Array:
     """What a collision at the instant that explains most beside all `columns` (n, k) adds, (n,): c_2's in (K1), (K2).
 
-    The largest leap of an acceleration may as well be its noise, or the way back of the ground.
+    The largest jump of an acceleration may as well be its noise, or the way back of the ground.
     """
     Q, _ = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))
     rest = left - Q @ (Q.T @ left)

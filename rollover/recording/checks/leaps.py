@@ -1,7 +1,7 @@
-"""Leaps that a channel's filter class lets no signal make: they come behind it, of an open contact or of lost samples.
+"""Jumps that a channel's filter class lets no signal make: they come behind it, of an open contact or of lost samples.
 
-A sample is held against the cubic through three neighbours on either side: about a leap two of them lie off theirs, one
-to either side, by nearly half of it. Behind the filter even a blow of no duration stays smooth, and what two of it lie
+A sample is held against the cubic through three neighbours on either side: about a jump two of them lie off theirs, one
+to either side, by nearly half of it. Behind the filter even an impact of no duration stays smooth; what two of it lie
 off is a known part of its height, whatever the motion. Clips, gaps, spikes and digits have reasons of their own.
 """
 
@@ -20,14 +20,14 @@ from rollover.recording.filters import filtered, least_rate
 Array = NDArray[np.float64]
 REACH = 3  # samples to either side
 ONE = np.eye(1, 4 * REACH + 1, 2 * REACH)[0]  # a sample among those that it touches
-PHASES = 8  # at which a blow may fall between two samples
-SURELY = 1.5  # times what a blow of no duration leaves
-TELLING = 0.3  # of a leap: not told where blows lie nearly as far off
+PHASES = 8  # at which an impact may fall between two samples
+SURELY = 1.5  # times what an impact of no duration leaves
+TELLING = 0.3  # of a jump: not told where impacts lie nearly as far off
 NOISY = 4.0  # standard deviations of the noise of such a difference
-BACK = 0.5  # of a leap, that comes back at the next sample: a spike
+BACK = 0.5  # of a jump, that comes back at the next sample: a spike
 DIGITS = 1.5  # steps of a digitised channel
-LASTING = 2.0  # periods of the filter's -3 dB frequency within which it is done with a blow
-AGAIN = 2  # leaps, at least: one alone is a disturbance
+LASTING = 2.0  # periods of the filter's -3 dB frequency within which it is done with an impact
+AGAIN = 2  # jumps, at least: one alone is a disturbance
 
 
 def leaping(t: Trace, cfc: int | None) -> NDArray[np.int64]:
@@ -59,7 +59,7 @@ def leaping(t: Trace, cfc: int | None) -> NDArray[np.int64]:
 
 
 def leaps(t: Trace, unit: str, cfc: int | None) -> Iterator[Finding]:
-    """Leaps that the filter class of a channel lets no signal make, if there are several."""
+    """Jumps that the filter class of a channel lets no signal make, if there are several."""
     found = leaping(t, cfc)
     if found.size < AGAIN:
         return
@@ -86,7 +86,7 @@ def across(values: Array) -> Array:
 
 @functools.lru_cache(maxsize=64)
 def of_a_blow(rate: float, cfc: int) -> float:
-    """How far a blow of no duration behind a filter class lies off cubics, over its height, at a rate (Hz)."""
+    """How far an impact of no duration behind a filter class lies off cubics, over its height, at a rate (Hz)."""
     fine = 1.0 / (PHASES * rate)
     blow = np.zeros(2 * PHASES * max(200, round(4.0 * rate * 0.6 / cfc)))
     blow[blow.size // 2] = 1.0

@@ -17,7 +17,7 @@ STANDS_OUT = 3.0  # times what is read before, that the load rises to: less may 
 NEAR = 0.3  # of the weight: what reads so much may carry it
 RECTIFIED = 3.0  # deviations: what never falls below 0 and stays within is the size of noise
 LEAST = 2.0  # independent samples
-MARGIN = 0.2  # of the stretch, at its end: what is filtered begins to rise before the blow
+MARGIN = 0.2  # of the stretch, at its end: what is filtered begins to rise before the impact
 
 _DROP = re.compile(r"ground/(force_normal|force_tangential|sinkage)")
 _ANY = re.compile(r"rops/(force(_[xyz])?|deflection)|device/(force|deflection)")

@@ -144,7 +144,7 @@ def gaps(t: Trace) -> Iterator[Finding]:
 def spikes(t: Trace, unit: str, *, among_contacts: bool = False) -> Iterator[Finding]:
     """Single samples far from what a cubic through their neighbours says, where these agree.
 
-    And from what those before and those after say, each by themselves: at a corner or a leap one side is right. The
+    And from what those before and those after say, each by themselves: at a corner or a jump one side is right. The
     largest first, each put where its neighbours say before the next is looked for, as it spoils what is said of these.
     `among_contacts`: of a force or acceleration of a vehicle, which touches again and again for no more than a sample.
     A spike is larger there than such contacts, those that hide in noise and, once it touches, all that are seen.

@@ -56,7 +56,7 @@ def stamps(recording: Recording) -> Iterator[Finding]:
 
 
 def lost(t: Trace, unit: str) -> Iterator[Finding]:
-    """Places at which something that cannot leap goes on as if samples were left out, on stamps that are counted.
+    """Places at which something that cannot jump goes on as if samples were left out, on stamps that are counted.
 
     Parabolas through the samples before and after differ at the place by the way of n samples, n whole, along the
     motion: a position is as continuous as the body it belongs to.
@@ -103,7 +103,7 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
 
 
 def _across(t: Trace, side: int) -> tuple[Array, Array, Array, float, float]:
-    """Leap from sample k to k + 1 (n - 1,), way of one sample, what bends may feign; errors of leap and way."""
+    """Jump from sample k to k + 1 (n - 1,), way of one sample, what bends may feign; errors of jump and way."""
     n = t.values.size
     s = np.arange(side) + 0.5  # in steps, from the middle between both
     V = np.vander(s, 3, increasing=True)
@@ -118,7 +118,7 @@ def _across(t: Trace, side: int) -> tuple[Array, Array, Array, float, float]:
     misfit_after = np.abs(windows[k + 1] - after @ V.T).max(axis=1)
     noise = 4.5 * t.floor.sigma  # the largest of 48 that noise leaves, 1 in 3000
     bend[k] = np.where(np.maximum(misfit_before, misfit_after) > noise, np.inf, 0.0)
-    turns = np.abs(after[:, 1] + before[:, 1])  # the speed leaps as well: a blow between both
+    turns = np.abs(after[:, 1] + before[:, 1])  # the speed jumps as well: an impact between both
     excess = np.maximum(turns - 6.0 * t.floor.sigma * float(np.linalg.norm(W[1])), 0.0)
     bend[k] += np.where(turns > STEADY * np.abs(way[k]) + 0.5 * (turns - excess), np.inf, 0.5 * excess)
     sigma = t.floor.sigma * float(np.sqrt(t.floor.independence))
