@@ -218,8 +218,8 @@ def test_the_hoop_stops_the_quad_bike_where_without_it_rolls_on() -> None:
     for frame in ({}, {"vehicle.rops": None}):
         rec = done(shipped("side_overturn").replaced({"vehicle": "vehicles/quad_bike.yaml"}).replaced(frame)).recording
         rest.append(math.degrees(-rec["chassis/roll"].min()))
-    assert 100.0 < rest[0] < 150.0
-    assert rest[1] > rest[0] + 10.0
+    assert 100.0 < rest[0] < 165.0  # found 148: short of its back
+    assert rest[1] > 180.0  # found 220: over it
 
 
 def test_a_higher_battery_tips_earlier() -> None:
