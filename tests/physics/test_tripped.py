@@ -169,9 +169,9 @@ def test_the_dolly_stops_as_the_standard_says() -> None:
     assert -gained[-1] == pytest.approx(30.0 * MPH, rel=1e-3)
     assert np.trapezoid(30.0 * MPH + gained, t) < 3.0 * FOOT
     assert np.sum(a <= -20.0 * 9.80665) * (t[1] - t[0]) > 0.04
-    bank, platform, flange = scenario.ground.surface.parts  # type: ignore[union-attr]
-    assert math.degrees(math.atan(platform.height / platform.length)) == pytest.approx(23.0, abs=0.02)
-    assert (bank.height, flange.height) == pytest.approx((9.0 * INCH, 4.0 * INCH), abs=1e-3)
+    bank, platform, flange = to_mapping(scenario)["ground"]["surface"]["parts"]
+    assert math.degrees(math.atan(platform["height"] / platform["length"])) == pytest.approx(23.0, abs=0.02)
+    assert (bank["height"], flange["height"]) == pytest.approx((9.0 * INCH, 4.0 * INCH), abs=1e-3)
 
 
 def test_without_a_flange_the_vehicle_leaves_the_dolly_at_its_speed() -> None:
