@@ -67,7 +67,7 @@ def headings(path: Path) -> dict[str, Node]:
 
 
 def stated_kind(keys: Mapping[str, Node], allowed: Iterable[str]) -> str | None:
-    """The word under `kind` in a file's `headings`, None where there is none. Raises `InputError` for what is no word."""
+    """The word under `kind` in a file's `headings`, None if there is none. Raises `InputError` for what is no word."""
     said = keys["kind"].plain if "kind" in keys else None
     if said is None or isinstance(said, str):
         return said
