@@ -190,7 +190,7 @@ def test_a_promise_is_kept_in_simulated_campaigns() -> None:
     assert promised is not None
     assert 0.7 < promised.probability < 0.95, "a promise that can be broken"
     count = 100
-    right = chosen_rightly(dataset, a, x, b, promised.x, count)
+    right = chosen_rightly(dataset, a, x, b, promised.x, count, np.random.default_rng(4))
     interval = binomtest(right, count).proportion_ci(0.99)
     assert interval.low <= promised.probability <= interval.high
 

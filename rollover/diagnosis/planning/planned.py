@@ -116,7 +116,8 @@ def _gained(e: Dataset, gain: float) -> Dataset:
         column = np.zeros(e.count)
         column[part] = gain * s.values
         columns.append(column)
-    return replace(e, nuisance=np.stack(columns, axis=1))
+    # a sample moved to the measured one as far as its neighbours go is no multiple of a gain
+    return replace(e, nuisance=np.stack(columns, axis=1), without_leaps=True)
 
 
 def showing(e: Dataset, raw: Array) -> Dataset:
