@@ -36,8 +36,8 @@ def test_the_folder_that_one_stands_in_is_written_and_not_exchanged(
     target.mkdir(parents=True)
     monkeypatch.chdir(target)
     here = os.stat(".").st_ino
+    words = [*words[: words.index("--out")], out, "."]
     for again in ((), ("--force",)):
-        words = [*words[: words.index("--out")], out, "."]
         result = rollover(*words, *again)
         assert result.exit_code == 0, result.output
         assert Path(file).is_file(), "the shell sees what was written"
