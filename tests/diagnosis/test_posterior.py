@@ -123,7 +123,7 @@ def test_an_overturn_and_a_model_of_ones_own_are_refused(folder: Path, tmp_path:
     assert not (tmp_path / "out").exists()
 
 
-def test_from_python_what_has_no_draws_is_refused_before_the_work(folder: Path) -> None:
+def test_from_python_what_has_no_draws_is_refused(folder: Path) -> None:
     for what, asked_for, words in (
         ("side_overturn", True, "posterior: of drops only, got an overturn"),
         ("drop_test", 20, "posterior: out of bounds, got 20; 500 to 1e\\+06 is allowed"),

@@ -27,7 +27,7 @@ from tests.rollover.machines import WRONG, Killed, commands, killed, once, posix
         ("prove", "benchmark.json"),
     ],
 )
-def test_the_folder_that_one_stands_in_is_written_and_not_exchanged(
+def test_the_folder_one_stands_in_is_not_exchanged(
     name: str, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     words, target = commands(tmp_path)[name]
@@ -49,7 +49,7 @@ def test_the_folder_that_one_stands_in_is_written_and_not_exchanged(
 
 @posix
 @pytest.mark.parametrize("inside", [True, False])
-def test_who_stands_in_the_folder_and_who_does_not_have_one_lock(inside: bool, tmp_path: Path) -> None:
+def test_inside_and_outside_there_is_one_lock(inside: bool, tmp_path: Path) -> None:
     words, target = commands(tmp_path)["rolling"]
     target.mkdir(parents=True)
     first, second = (target, tmp_path) if inside else (tmp_path, target)
@@ -70,7 +70,7 @@ def test_who_stands_in_the_folder_and_who_does_not_have_one_lock(inside: bool, t
     ("name", "killed_at"),
     [(n, k) for n in ("rename", "replace", "unlink") for k in (1, 2, 3) if (n, k) != ("unlink", 3)],
 )
-def test_a_kill_in_the_folder_one_stands_in_is_put_right_from_elsewhere(
+def test_a_kill_inside_is_put_right_from_elsewhere(
     name: str, killed_at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The third `unlink` would be that of the lock, which ends with its process."""
@@ -101,7 +101,7 @@ def test_a_kill_in_the_folder_one_stands_in_is_put_right_from_elsewhere(
     assert [p.name for p in tmp_path.iterdir()] == ["a"]
 
 
-def test_a_folder_above_the_one_that_one_stands_in_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_above_ones_own_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     below = tmp_path / "cases" / "case-001"
     below.mkdir(parents=True)
     monkeypatch.chdir(below)
