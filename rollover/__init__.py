@@ -41,19 +41,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Calibration", "Comparison", "Diagnosis", "ForwardModel", "Identification", "InputError", "Parameter"]
 __all__ += ["PeakLoad", "Recording", "Regression", "Run", "Scenario", "Stability", "Term", "__version__"]
-__all__ += [
-    "calibrate",
-    "compare",
-    "diagnose",
-    "identify",
-    "load",
-    "read",
-    "regress",
-    "run",
-    "stability",
-    "study",
-    "synthesize",
-]
+__all__ += ["calibrate", "compare", "diagnose", "identify", "load", "read", "regress", "run", "stability", "study"]
+__all__ += ["synthesize"]
 
 _ELSEWHERE = {  # what stands in a package by itself, imported when it is asked for
     "Calibration": "calibration.calibrate",
@@ -225,6 +214,7 @@ def calibrate(
     clock_sigma: float = 1e-3,
     starts: int = 8,
     seed: int = 0,
+    posterior: bool | int = False,
     profile: str | Path | None = None,
     workers: int = 0,
 ) -> Calibration:
@@ -244,6 +234,8 @@ def calibrate(
         Prior of each recording's clock offset, 1 sigma, s.
     starts, seed
         Random starts that are looked at, and their seed.
+    posterior
+        Whether to sample what the recordings leave open (`Calibration.draws`), or how many draws; 3000.
     workers
         Child processes that follow the starts.
 
@@ -257,6 +249,7 @@ def calibrate(
     InputError
         For wrong input, and recordings of which nothing can be compared.
     """
+    from rollover.calibration.posterior import draws_of
     from rollover.calibration.request import Request
     from rollover.comparison.recordings import measured
     from rollover.scenario import given
@@ -272,6 +265,7 @@ def calibrate(
         clock_sigma=clock_sigma,
         starts=starts,
         seed=seed,
+        posterior=draws_of(posterior),
         workers=workers,
     )
 
@@ -284,6 +278,7 @@ def diagnose(
     tolerance: float | Mapping[str, float] = 0.0,
     reference: str | Sequence[str] = (),
     estimate: bool | Literal["unexplained"] = "unexplained",
+    posterior: bool | int = False,
     profile: str | Path | None = None,
     workers: int = 0,
 ) -> Diagnosis:
@@ -302,6 +297,8 @@ def diagnose(
     estimate
         Estimate that share where nothing explains the recordings, and diagnose again beside it: in place of
         "unexplained" where no share is stated; True: whatever is stated, dropping what is doubtful then; False: never.
+    posterior
+        Whether to sample the numbers of what is named (`Diagnosis.posterior`), or how many draws; 3000. Of drops only.
     workers
         Child processes that fit at once; the answer is the same.
 
@@ -324,6 +321,7 @@ def diagnose(
         tolerance=tolerance,
         reference=reference,
         estimate=estimate,
+        posterior=posterior,
         profile=profile,
         workers=workers,
     )

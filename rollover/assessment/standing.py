@@ -16,7 +16,7 @@ from rollover.assessment.results import versions
 from rollover.assessment.stability import Loss, StabilityAngle, losses, stability_angles
 from rollover.dynamics.support import closed_form
 from rollover.scenario import AnyVehicle, Ground, Scenario, Simulation, load
-from rollover.spec.document import find, slot_of
+from rollover.spec.document import find, slot_of, stated_kind
 from rollover.spec.document import headings as headings_of
 from rollover.spec.document import load as load_as
 from rollover.spec.initiation import Standing
@@ -92,9 +92,8 @@ def file_of(name: str | Path) -> Path:
 def scenario_of(name: str | Path) -> Scenario:
     """The scenario of that name, or a vehicle on level ground."""
     path = file_of(name)
-    keys = headings_of(path)
-    kind = keys["kind"].plain if "kind" in keys else None
-    if kind not in slot_of(AnyVehicle).kinds:
+    vehicles = slot_of(AnyVehicle).kinds
+    if stated_kind(headings_of(path), vehicles) not in vehicles:
         return load(path)
     vehicle = load_as(path, AnyVehicle)
     if not isinstance(vehicle, Vehicle) or len(vehicle.wheels) < 3:

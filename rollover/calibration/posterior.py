@@ -17,12 +17,15 @@ from numpy.typing import NDArray
 
 from rollover.calibration.identifiability import Determination
 from rollover.calibration.objective import Objective
+from rollover.system.arguments import within
 from rollover.system.errors import Fault, InputError
 
 Array = NDArray[np.float64]
 LogDensity = Callable[[Array], float]
 
 DRAWS = 3000
+FEWEST, MOST = 500, 1_000_000  # draws: quantiles at 2.5 % of fewer are a dozen draws; of more fill the memory
+OPTION = "--posterior"
 LEAST_WALKERS = 16  # and at least twice as many as parameters, which jumps along differences ask for
 WARM_UP = 0.1  # share of the steps that are thrown away: walkers start from the jumps' density, near to the posterior's
 FREEDOM = 5.0  # of the Student's t that jumps are drawn by: heavier tails than those of any quadratic approximation
@@ -110,13 +113,31 @@ def of_fit(objective: Objective, u: Array, found: Determination, *, draws: int =
     return sampled(log_density, u, found.covariance, draws=draws, seed=seed)
 
 
-def installed() -> None:
-    """Raise `InputError` with the cure where emcee is missing."""
+def draws_of(asked: bool | int) -> int:
+    """How many draws are asked for: none, the usual number, or so many.
+
+    Raises `InputError`, where emcee is missing too.
+    """
+    if isinstance(asked, bool) or asked == 0:
+        draws = DRAWS if asked else 0
+    else:
+        within("posterior", asked, FEWEST, MOST)
+        if int(asked) != asked:
+            message = f"not a whole number, got {asked!r}; True, or a number of draws is allowed"
+            raise InputError(Fault(path="posterior", message=message))
+        draws = int(asked)
+    if draws:
+        installed("posterior")
+    return draws
+
+
+def installed(by: str = OPTION) -> None:
+    """Raise `InputError` with the cure where emcee is missing; `by` names what asks for it."""
     try:
         import emcee  # noqa: F401
     except ImportError:
-        message = "emcee is not installed; pip install 'rollover[posterior]' brings it, or leave --posterior out"
-        raise InputError(Fault(file="--posterior", message=message)) from None
+        message = f"emcee is not installed; pip install 'rollover[posterior]' brings it, or leave {by} out"
+        raise InputError(Fault(file=by, message=message)) from None
 
 
 def sampled(

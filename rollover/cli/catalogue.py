@@ -20,7 +20,7 @@ from rollover.spec.rops import Rops
 from rollover.spec.steel import Steel
 from rollover.spec.vehicle import Vehicle, pitch_inertia
 from rollover.system import own_code
-from rollover.system.errors import Fault, InputError, excerpt
+from rollover.system.errors import Fault, InputError
 
 Row = dict[str, Any]
 
@@ -156,10 +156,7 @@ def check(name: str) -> str:
     if path.suffix.lower() == ".py":
         return _check_code(path)
     keys = document.headings(path)
-    kind = keys["kind"].plain if "kind" in keys else None
-    if kind is not None and not isinstance(kind, str):
-        known = (*known_laws(), *document.slot_of(scenarios.AnyVehicle).kinds)
-        raise keys["kind"].place.fault("kind", f"not a word, got {excerpt(repr(kind))}; {', '.join(known)} are allowed")
+    kind = document.stated_kind(keys, (*known_laws(), *document.slot_of(scenarios.AnyVehicle).kinds))
     form = str(keys["format"].plain if "format" in keys else "")
     if form.startswith("rollover-profile/"):
         from rollover.recording.importers.sidecar import Profile, read_described

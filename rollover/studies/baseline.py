@@ -159,9 +159,8 @@ def read(path: Path) -> Baseline:
     """Read a baseline. Raises `InputError`, for a tolerance below the discretisation error too."""
     found: Baseline = document.load(path, Baseline)
     if found.scenario != path.stem:
-        raise InputError(
-            Fault(file=str(path), path="scenario", message=f"got {found.scenario!r}; the file's name, {path.stem!r}")
-        )
+        message = f"got {found.scenario!r}; the file's name, {path.stem!r}, is needed"
+        raise InputError(Fault(file=str(path), path="scenario", message=message))
     return found
 
 

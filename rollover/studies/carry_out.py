@@ -24,7 +24,7 @@ from rollover.studies.runner import Builder, Conducted, Progress, Way, conduct, 
 from rollover.studies.study import Study, load
 from rollover.studies.summary import answers, values_of
 from rollover.system.errors import Fault, InputError
-from rollover.system.writing import sweep
+from rollover.system.writing import holding, sweep
 
 Page = Callable[[Conducted, Mapping[str, Any]], str]
 SET = "--set"
@@ -62,7 +62,7 @@ class Prepared:
         are done. Raises `InputError`.
         """
         chosen, target = self.study, self.target
-        with case_store.locked(target):
+        with holding(target):
             _begin(self)
             began = time.perf_counter()
             with watch("cases") as show:
@@ -125,6 +125,7 @@ def _begin(ready: Prepared) -> None:
     target, name, chosen = ready.target, ready.name, ready.study
     target.mkdir(parents=True, exist_ok=True)
     sweep(target)  # what a process left that was killed
+    (target / case_store.LOCK).unlink(missing_ok=True)  # of an earlier version, which locked the folder from within
     head = f"{chosen.title}\nEvery value of the study beside this file."
     case_store.put_text(target / case_store.STUDY, dump(chosen, head))
     if not (target / case_store.ACCOUNT).exists() or _name_of(target / case_store.ACCOUNT) != name:

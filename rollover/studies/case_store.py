@@ -6,14 +6,12 @@ the same scenario share a file.
 
 from __future__ import annotations
 
-import errno
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from rollover.assessment.results import plain
 from rollover.recording import UnreadableError, put_text, read_pairs, read_table, write_pairs, write_table
@@ -21,6 +19,7 @@ from rollover.studies.case import Result, stated_versions
 from rollover.studies.study import Study, meaning_of, unit_of
 from rollover.system.errors import Fault, InputError
 from rollover.system.processes import Failure
+from rollover.system.writing import PART, hold, own
 
 FORMAT = "rollover-study-account/1"
 ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK = (
@@ -38,14 +37,12 @@ FILES = (ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK)
 TOLD = ("finished", "wall_time", "cpu_time", "peak_memory", "host", "process", "integrator")
 PROVENANCE_UNITS = {"wall_time": "s", "cpu_time": "s", "peak_memory": "B"}
 _TYPES = dict.fromkeys(("wall_time", "cpu_time", "peak_memory", "process"), (int, float))  # of what is told; else text
-_OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 __all__ = [
     "Row",
     "claim",
     "compact",
     "keep",
-    "locked",
     "put_text",
     "read_plan",
     "row_of",
@@ -96,17 +93,18 @@ def row_of(key: str, result: Result | None, failure: Failure | None, wall_time: 
 
 
 def claim(folder: Path, name: str, *, force: bool) -> Path:
-    """Resolve a study's folder after making sure that it may be written. Raises `InputError`, changes nothing.
+    """Resolve a study's folder after making sure that it may be written; a command holds it from here to its end.
 
     The same study, changed or not, goes on in its folder; another one replaces it only with `force`. A folder that
-    holds anything but a study is never touched.
+    holds anything but a study is never touched. Raises `InputError`.
     """
+    if folder.exists() and not folder.is_dir():
+        raise _refused(folder, "not a folder, but a file; another --out is needed")
+    hold(folder)
     target = folder.resolve()
     if not target.exists():
         return target
-    if not target.is_dir():
-        raise _refused(folder, "not a folder, but a file; another --out is needed")
-    names = [p.name for p in target.iterdir() if not p.name.endswith(".part")]
+    names = [p.name for p in target.iterdir() if not p.name.endswith(PART) and not own(target, p.name)]
     if led := [p.name for p in target.iterdir() if p.is_symlink() and not p.resolve().is_relative_to(target)]:
         raise _refused(folder, f"holds a link that leads out of it, got {led[0]!r}; another --out is needed")
     if foreign := sorted(set(names) - set(FILES)):
@@ -121,41 +119,6 @@ def claim(folder: Path, name: str, *, force: bool) -> Path:
         got = found.get("name", found.get("format", ""))
         raise _refused(folder, f"holds another study, got {got!r}; --force replaces it, --out leaves it")
     return target
-
-
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Keep a second process out of the folder; the lock ends with its process, however. Raises `InputError`."""
-    try:
-        import fcntl
-    except ImportError:  # Windows: two at once only do the same work twice
-        yield
-        return
-    with _opened(folder) as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise _refused(folder, "is being worked on by another process; wait for it, or another --out") from None
-        try:
-            yield
-        except OSError as e:
-            if e.errno in _OF_THE_DISK and e.filename is None:  # a write names no file
-                e.filename = str(folder)
-            raise
-
-
-def _opened(folder: Path) -> IO[str]:
-    """The file of the lock, written to: a full or a read-only disk refuses that before anything is worked out."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        file = (folder / LOCK).open("a", encoding="utf-8")
-        file.truncate(0)
-        file.write(f"{os.getpid()}\n")
-        file.flush()
-    except OSError as e:
-        what = f"cannot be written: {e.strerror or e}; a place with room that may be written is needed"
-        raise _refused(folder, what) from None
-    return file
 
 
 def path_of(folder: Path, key: str) -> Path:

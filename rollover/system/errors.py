@@ -46,8 +46,9 @@ def sentence(text: str) -> str:
         return text
     before, got, rest = text.partition("got ")
     value, cure, allowed = rest.rpartition("; ") if "; " in rest else (rest, "", "")
-    text = _QUOTED.sub(lambda found: excerpt(found[0]), f"{before}{got}{excerpt(value)}{cure}{allowed}")
-    return excerpt(text, MOST_SAID)
+    # each part by itself: a value that was cut has lost its closing quote, and would find another in what follows
+    before, allowed = (_QUOTED.sub(lambda found: excerpt(found[0]), part) for part in (before, allowed))
+    return excerpt(f"{before}{got}{excerpt(value)}{cure}{allowed}", MOST_SAID)
 
 
 @dataclass(frozen=True, kw_only=True)

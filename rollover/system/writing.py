@@ -6,9 +6,12 @@ its process. What is not yet whole stands beside the target under a hidden name 
     .NAME.xxxxxxxx.part     being written; thrown away
     .NAME.xxxxxxxx.old      what stood there, for the moment of the exchange; put back if its place is empty
     .NAME.xxxxxxxx.commit   files that are whole and on their way to their places; the way is finished
+    .NAME.xxxxxxxx.replace  the same, for a folder of which all else is removed first
     .NAME.lock              the lock
 
-A folder that cannot be exchanged, as a mounted one, holds all that itself.
+A folder that cannot be exchanged, as a mounted one, holds all that itself. One that the command was started in is not
+exchanged either, or its shell would stand in a folder that is gone: what is not yet whole stands in it, file by file it
+goes to its place.
 """
 
 from __future__ import annotations
@@ -29,11 +32,12 @@ from typing import Any
 from rollover.system.errors import Fault, InputError
 from rollover.system.names import inside
 
-PART, OLD, COMMIT = ".part", ".old", ".commit"
+PART, OLD, COMMIT, REPLACE = ".part", ".old", ".commit", ".replace"
 NOTES = "fits"  # what a diagnosis has fitted so far, for a next start to go on with
 SCRATCH = "rollover-"  # how temporary folders begin
 _MOST_BYTES = 200  # of a name that others are made of; with what is added it stays below the 255 of a file system
 _MODES = 0o666, 0o777
+_OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 
 class Work:
@@ -68,7 +72,7 @@ def hold(target: Path) -> None:
     if _work is not None and target not in _work.targets:
         with contextlib.ExitStack() as stack:
             stack.enter_context(_unmade(target.parent))
-            stack.enter_context(_holding(target))
+            stack.enter_context(_alone(target))
             _work.targets[target] = stack.pop_all()
 
 
@@ -82,6 +86,22 @@ def check_free(*targets: Path, force: bool = False) -> None:
 
 
 @contextlib.contextmanager
+def holding(target: Path) -> Iterator[None]:
+    """Hold a target for the moment, where the command does not hold it anyway; a disk that refuses a write is named.
+
+    Raises `InputError` as `hold` does.
+    """
+    target = _resolved(target)
+    with contextlib.nullcontext() if _work and target in _work.targets else _alone(target):
+        try:
+            yield
+        except OSError as e:
+            if e.errno in _OF_THE_DISK and e.filename is None:  # a write to an open file names none
+                e.filename = str(target)
+            raise
+
+
+@contextlib.contextmanager
 def whole(folder: Path, prepare: Callable[[Path, Path], Callable[[], None] | None] | None = None) -> Iterator[Path]:
     """Fill a temporary folder that takes the place of `folder` at the very end, or leaves nothing behind.
 
@@ -89,7 +109,7 @@ def whole(folder: Path, prepare: Callable[[Path, Path], Callable[[], None] | Non
     command finishes what it leaves undone.
     """
     target = _resolved(folder)
-    with _held(target):
+    with holding(target):
         place = _place(target)
         place.mkdir(parents=True, exist_ok=True)  # it may have been removed since the start
         part = Path(tempfile.mkdtemp(prefix=_prefix(target), suffix=PART, dir=place))
@@ -109,7 +129,7 @@ def whole(folder: Path, prepare: Callable[[Path, Path], Callable[[], None] | Non
 @contextlib.contextmanager
 def together(target: Path) -> Iterator[Path]:
     """Fill a temporary folder whose files go beside `target`, the file that names them, all of them or none."""
-    with _held(target):
+    with holding(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         part = Path(tempfile.mkdtemp(prefix=_prefix(target), suffix=PART, dir=target.parent))
         try:
@@ -157,9 +177,9 @@ def staged(path: Path, write: Callable[[Path], Any]) -> Path:
 def exchange(part: Path, target: Path) -> None:
     """Let a folder take the place of another, which stays where that fails."""
     if part.parent == target:  # it cannot be moved away: its files are exchanged, which the next start would finish
-        done = part.with_suffix(COMMIT)
+        done = part.with_suffix(REPLACE)
         os.rename(part, done)
-        _spread(done, target)
+        _replace(done, target)
         return
     if not target.exists():
         os.rename(part, target)
@@ -183,7 +203,7 @@ def own(target: Path, name: str) -> bool:
 def notes(target: Path) -> Path:
     """Where a command may keep what it has worked out so far, until its results stand there."""
     target = _resolved(target)
-    return _place(target) / f"{_prefix(target)}{NOTES}"
+    return _anchor(target) / f"{_prefix(target)}{NOTES}"
 
 
 @contextlib.contextmanager
@@ -205,15 +225,21 @@ def sweep(folder: Path) -> None:
         _removed(part)
 
 
+def _replace(done: Path, folder: Path) -> None:
+    """Remove what stands in a folder; only then do files move there, so that none of them is ever taken for old."""
+    kept = {*(p.name for p in done.iterdir()), done.name}
+    for other in folder.iterdir():
+        if other.name not in kept and not own(folder, other.name):
+            _removed(other)
+    moving = done.with_suffix(COMMIT)
+    os.rename(done, moving)
+    _spread(moving, folder)
+
+
 def _spread(done: Path, folder: Path, last: str = "") -> None:
-    """Move files to their folder, `last` at the end; all but these go where it is not named."""
+    """Move files to their folder, `last` at the end."""
     names = sorted(p.name for p in done.iterdir())
-    if not last:
-        kept = {*names, done.name}
-        for other in folder.iterdir():
-            if other.name not in kept and not own(folder, other.name):
-                _removed(other)
-    elif last in names:  # what a recording's table means changes while there is no table
+    if last in names:  # what a recording's table means changes while there is no table
         (folder / last).unlink(missing_ok=True)
     for name in sorted(names, key=lambda name: name == last):
         if (folder / name).is_dir() and not (folder / name).is_symlink():
@@ -223,19 +249,21 @@ def _spread(done: Path, folder: Path, last: str = "") -> None:
 
 
 def _settle(target: Path) -> None:
-    """Put right what a killed process left of writing to a target."""
-    place = _place(target)
+    """Put right what a killed process left of writing to a target, beside it or in it."""
     known = _left(target)
-    for entry in sorted(place.iterdir()) if place.is_dir() else ():
-        found = known.fullmatch(entry.name)
-        if found is None:
-            continue
-        if found[1] == OLD and not target.exists():
-            os.rename(entry, target)
-        elif found[1] == COMMIT and not entry.is_symlink() and entry.is_dir():
-            _spread(entry, place, "" if place == target else target.name)
-        else:
-            _removed(entry)
+    for place in (target.parent, target):
+        for entry in sorted(place.iterdir()) if place.is_dir() else ():
+            found = known.fullmatch(entry.name)
+            if found is None:
+                continue
+            if found[1] == OLD and not target.exists():
+                os.rename(entry, target)
+            elif found[1] == COMMIT and not entry.is_symlink() and entry.is_dir():
+                _spread(entry, place, "" if place == target else target.name)
+            elif found[1] == REPLACE and place == target and not entry.is_symlink() and entry.is_dir():
+                _replace(entry, target)
+            else:
+                _removed(entry)
 
 
 def _removed(path: Path) -> None:
@@ -246,20 +274,14 @@ def _removed(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def _held(target: Path) -> Iterator[None]:
-    """Hold a target for the moment, where the command does not hold it anyway."""
-    with contextlib.nullcontext() if _work and _resolved(target) in _work.targets else _holding(_resolved(target)):
-        yield
-
-
-@contextlib.contextmanager
-def _holding(target: Path) -> Iterator[None]:
+def _alone(target: Path) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             if target.is_dir() and not os.access(target, os.W_OK | os.X_OK):
                 raise OSError(errno.EACCES, "it is read-only")
-            stack.enter_context(_locked(_place(target) / f"{_prefix(target)}lock", target))
+            _check_not_below(target)
+            stack.enter_context(_locked(_anchor(target) / f"{_prefix(target)}lock", target))
             _settle(target)
         except OSError as e:
             what = f"cannot be written: {e.strerror or e}; a place with room that may be written is needed"
@@ -320,10 +342,31 @@ def _taken(handle: int) -> bool:
     return True
 
 
-def _place(target: Path) -> Path:
-    """Where what is not yet whole stands: beside the target, in it where it is mounted or beside it is no way."""
+def _anchor(target: Path) -> Path:
+    """Where its lock stands, wherever a command was started: beside the target, in it where beside it is no way."""
     stays = target.is_dir() and (os.path.ismount(target) or not os.access(target.parent, os.W_OK))
     return target if stays else target.parent
+
+
+def _place(target: Path) -> Path:
+    """Where what is not yet whole stands: in the target too where this process was started in it."""
+    return target if _started_in() == target else _anchor(target)
+
+
+def _check_not_below(target: Path) -> None:
+    """Refuse a folder above the one that this process was started in, which might be replaced with it."""
+    here = _started_in()
+    if here is not None and target in here.parents and target.is_dir():
+        what = f"holds the folder that this was started in, got {here}; start from elsewhere, or another --out"
+        raise InputError(Fault(file=str(target), message=what))
+
+
+def _started_in() -> Path | None:
+    """The folder that the shell stands in; None where it is gone."""
+    try:
+        return Path.cwd()
+    except OSError:
+        return None
 
 
 def _resolved(target: Path) -> Path:
@@ -341,7 +384,7 @@ def _prefix(target: Path) -> str:
 
 
 def _left(target: Path) -> re.Pattern[str]:
-    return re.compile(rf"{re.escape(_prefix(target))}[a-z0-9_]{{8}}(\.(?:part|old|commit))")
+    return re.compile(rf"{re.escape(_prefix(target))}[a-z0-9_]{{8}}(\.(?:part|old|commit|replace))")
 
 
 def _umask() -> int:

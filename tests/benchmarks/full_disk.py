@@ -1,8 +1,8 @@
 """Disks that are really full, at ten places of four commands: `python -m tests.benchmarks.full_disk` (Linux, as root).
 
 The results of `run`, `study`, `diagnose` and `import` go to a file system in memory that has room for one to ten
-elevenths of what the command writes. Each must end with one line that says so and leave nothing but the lock and, of a
-study, its finished cases. `tests/rollover/test_machine.py` asks it of every command, with
+elevenths of what the command writes. Each must end with one line that says so and leave nothing but, of a study, its
+finished cases. `tests/rollover/test_machine.py` asks it of every command, with
 writes that are refused.
 """
 
@@ -44,7 +44,7 @@ def faults(name: str, words: list[object], out: Path, size: int) -> tuple[str, l
     """The last line that a command says on a disk of `size` bytes, and what is wrong with how it ended."""
     with disk(out, size):
         done = subprocess.run(line(*words), capture_output=True, text=True, cwd=ROOT)
-        left = [p for p in out.rglob("*") if p.is_file() and p.name != ".lock"]
+        left = [p for p in out.rglob("*") if p.is_file()]
         left = [p for p in left if name != "study" or p.name.startswith(".")]
     lines = done.stderr.splitlines() or ["nothing"]
     wrong = [f"status {done.returncode}"] if done.returncode not in (WRONG, MACHINE) else []

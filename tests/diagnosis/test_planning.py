@@ -19,7 +19,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate, coordinates
 from rollover.diagnosis.planning import chances
 from rollover.diagnosis.planning.by_fits import next_test
 from rollover.diagnosis.planning.plan import plan, usual_noise
-from rollover.diagnosis.planning.planned import Instruments, coloured, only, planned
+from rollover.diagnosis.planning.planned import Instruments, coloured, only, planned, showing
 from rollover.diagnosis.planning.separation import Tests as PlannedTests
 from rollover.diagnosis.planning.strength import place_where_it_acts, strength_with
 from rollover.diagnosis.prepared import prepared, weighted_datasets
@@ -190,7 +190,7 @@ def test_a_promise_is_kept_in_simulated_campaigns() -> None:
     assert promised is not None
     assert 0.7 < promised.probability < 0.95, "a promise that can be broken"
     count = 100
-    right = chosen_rightly(dataset, a, x, b, promised.x, count)
+    right = chosen_rightly(dataset, a, x, b, promised.x, count, np.random.default_rng(4))
     interval = binomtest(right, count).proportion_ci(0.99)
     assert interval.low <= promised.probability <= interval.high
 
@@ -266,3 +266,36 @@ def test_a_diagnosis_asks_for_the_drop_where_its_fits_differ() -> None:
     less = next_test(scenario(), loud, one, other)
     assert less is not None
     assert (less.value, -less.probability) > (found.value, -found.probability), "louder instruments ask for more"
+
+
+def test_a_rival_is_refitted_to_the_end() -> None:
+    """What a rival leaves is a minimum: no search from there finds less, of friction through damping."""
+    dataset = drops(1.0, 3.5)
+    known = effects_of(dataset)
+    a, b = known["guide-friction"], known[DAMPING]
+    tests = PlannedTests(dataset)
+    place = place_where_it_acts(a, lambda x: tests.unexplained(a, x))
+    assert place is not None
+    x = strength_with(a, place, lambda x: tests.unexplained(a, x), 12.0)
+    assert x is not None
+    found, shown = tests.apart(a, x, b), tests.shown(a, x)
+    assert found is not None
+    assert shown is not None
+    for start in (found.x, (0.02,), (0.03,), (0.1,)):
+        other = shown[0].fit((b,), start, rounds=20, finely=True)
+        assert other is not None
+        assert found.noncentrality < other.total + 0.05, "of 12: a twentieth moves the probability by 0.001"
+
+
+def test_errors_of_gains_leave_no_more_than_themselves() -> None:
+    """Gains alone are off, by what is stated of them: beside the true effect that leaves less than their squares."""
+    dataset = drops(1.0, 3.5)
+    one, x, rng = effects_of(dataset)["soil-stiffness"], (0.525,), np.random.default_rng(7)
+    for _ in range(6):
+        for e in dataset:
+            assert e.nuisance is not None
+            z = rng.standard_normal(e.nuisance.shape[1])
+            raw = e.raw(e.simulator.predict(Problem.changes([one], x), 0.0) or {}) + e.nuisance @ z
+            block = Problem([showing(e, raw)]).block(0, (one,), x, 0.0, 0.0)
+            assert block is not None
+            assert block.total < float(z @ z)

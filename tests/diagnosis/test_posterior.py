@@ -13,6 +13,7 @@ import pytest
 from scipy.stats import kstest
 from typer.testing import CliRunner
 
+import rollover as ro
 from rollover.cli.main import app
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
@@ -20,6 +21,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.inference.posterior import drawn
+from rollover.diagnosis.own_model.files import found_at
 from rollover.effects import Search
 from rollover.recording.importers import write_recording
 from tests.diagnosis.drops import recorded, scenario
@@ -68,6 +70,11 @@ def test_draws_of_what_is_named_lie_where_its_interval_does(folder: Path, tmp_pa
     text = (out / "report.html").read_text()
     assert "What stays open" in text
     assert "--posterior --draws 1000" in text
+    found = ro.diagnose("drop_test", folder, posterior=1000)
+    assert found.posterior is not None
+    assert list(found.posterior.names) == rows[0]
+    # posterior.csv has nine digits
+    assert np.allclose(found.posterior.values, draws, rtol=1e-8), "the same draws from Python"
     without = asked(*words, "--force")
     assert without.exit_code == 0, without.output
     again = json.loads((out / "diagnosis.json").read_text())
@@ -116,8 +123,28 @@ def test_an_overturn_and_a_model_of_ones_own_are_refused(folder: Path, tmp_path:
     assert not (tmp_path / "out").exists()
 
 
+def test_from_python_what_has_no_draws_is_refused(folder: Path) -> None:
+    for what, asked_for, words in (
+        ("side_overturn", True, "posterior: of drops only, got an overturn"),
+        ("drop_test", 20, "posterior: out of bounds, got 20; 500 to 1e\\+06 is allowed"),
+        ("drop_test", -1, "posterior: out of bounds, got -1"),
+        ("drop_test", 1e3 + 0.5, "posterior: not a whole number, got 1000.5"),
+        (found_at("duffing"), True, "not of a model of one's own; .* posterior"),
+    ):
+        with pytest.raises(ro.InputError, match=words):
+            ro.diagnose(what, folder, posterior=asked_for)  # type: ignore[arg-type]
+
+
 def test_without_the_package_the_cure_is_named(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "emcee", None)
+    for call in (
+        lambda: ro.diagnose("drop_test", folder, posterior=True),
+        lambda: ro.calibrate("drop_test", folder, "vehicle.mass", posterior=True),
+    ):
+        with pytest.raises(
+            ro.InputError, match=r"pip install 'rollover\[posterior\]' brings it, or leave posterior out"
+        ):
+            call()
     done = asked("drop_test", folder, "--posterior", "--out", tmp_path / "out")
     assert done.exit_code == 2
     assert "pip install 'rollover[posterior]'" in done.output

@@ -33,15 +33,9 @@ from tests.rollover.machines import (
 def test_a_second_start_is_told_of_the_first(name: str, tmp_path: Path) -> None:
     words, _ = commands(tmp_path)[name]
     target = tmp_path / "out" / {"synthesize": "d.csv", "export": "e.csv"}.get(name, "a")
-    if name == "study":
-        from rollover.studies import case_store
-
-        with case_store.locked(target):
-            result = forked.command(*words)
-    else:
-        with writing.working():
-            writing.hold(target)
-            result = forked.command(*words)
+    with writing.working():
+        writing.hold(target)
+        result = forked.command(*words)
     assert result.returncode == WRONG, result.stderr
     assert "by another process" in result.stderr
     assert len(result.stderr.splitlines()) == 1

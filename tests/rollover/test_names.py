@@ -202,3 +202,16 @@ def test_a_title_from_data_moves_no_cursor(tmp_path: Path) -> None:
 
 def rollover(*words: object) -> Result:
     return CliRunner().invoke(app, [str(w) for w in words])
+
+
+@pytest.mark.parametrize("quote", ["'", '"'])
+@pytest.mark.parametrize(
+    "allowed",
+    ["the file's name, 'drop_test', is needed", "what the file's \"kind\" and the folder's name are is needed"],
+)
+def test_a_long_value_takes_nothing_of_its_cure_along(allowed: str, quote: str) -> None:
+    """The value is cut before its closing quote, and an apostrophe of the cure is none of it."""
+    said = str(Fault(file="a.yaml", path="scenario", message=f"got {quote}{'7' * 1000}{quote}; {allowed}"))
+    assert said.endswith(f"characters); {allowed}"), said
+    assert said.count("characters)") == 1
+    assert 300 < len(said) < 450

@@ -13,6 +13,7 @@ import pytest
 from scipy.stats import chisquare
 from typer.testing import CliRunner
 
+import rollover as ro
 from rollover.calibration.posterior import r_hat, sampled
 from rollover.cli.main import app
 from rollover.recording.importers import write_recording
@@ -117,6 +118,10 @@ def test_the_draws_of_a_calibration_agree_with_its_intervals(drops: Path, tmp_pa
         assert each["r_hat"] < 1.1
         assert 1.0 <= each["autocorrelation_time"] < 10.0
         assert each["effective_draws"] > 100.0
+    paths = ["vehicle.mass", "ground.law.stiffness_scale=0.3:3"]
+    fitted = ro.calibrate("drop_test", drops, paths, starts=0, posterior=1000)
+    assert np.allclose(fitted.draws, draws, rtol=1e-8), "the same draws from Python"
+    assert ro.calibrate("drop_test", drops, paths, starts=0).draws.shape == (0, 2)
     assert told["correlation"][0][1] == pytest.approx(answer["correlation"][0][1], abs=0.1)
     page = (out / "report.html").read_text()
     assert "What stays open" in page

@@ -25,6 +25,7 @@ from rollover.scenario import load
 from rollover.spec import document
 from rollover.studies import case_store
 from rollover.studies.axis import LogNormal, Normal, SoilScatter, Triangular
+from rollover.studies.carry_out import prepared
 from rollover.studies.case import work
 from rollover.studies.design import points
 from rollover.studies.runner import Builder, Conducted, Way, conduct
@@ -377,6 +378,10 @@ def test_the_worst_case_repeats(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("reason", "named"), [(errno.ENOSPC, True), (errno.EPIPE, False)])
 def test_a_disk_that_refuses_a_write_is_named(reason: int, named: bool, tmp_path: Path) -> None:
     # what a library writes to an open file raises without a name; who has stopped reading is no disk
-    with pytest.raises(OSError, match=os.strerror(reason)) as fault, case_store.locked(tmp_path):
+    def full(*_: object) -> None:
         raise OSError(reason, os.strerror(reason))
-    assert (fault.value.filename == str(tmp_path)) is named
+
+    ready = prepared(drops(tmp_path, ("count: 20", "count: 2")), tmp_path / "out")
+    with pytest.raises(OSError, match=os.strerror(reason)) as fault:
+        ready.carried_out(Way(workers=0), page=full)
+    assert (fault.value.filename == str(tmp_path / "out")) is named

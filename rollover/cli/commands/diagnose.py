@@ -145,24 +145,22 @@ def diagnose(
         begin_server("rollover.diagnosis.fit.warmup")
 
     from rollover.assessment import results
-    from rollover.calibration.posterior import installed, table
+    from rollover.calibration.posterior import OPTION, installed, table
     from rollover.cli import console
     from rollover.comparison.recordings import held_out, read
     from rollover.diagnosis import account, diagnosed_text
+    from rollover.diagnosis.asked import check_is_drop
     from rollover.diagnosis.fit.jobs import Executor
     from rollover.diagnosis.io import DRAWS, FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
     from rollover.diagnosis.overlay import series
     from rollover.diagnosis.sensors_first import check, diagnosed, plain, sensor_precheck
-    from rollover.dynamics.drop_test import unfit
     from rollover.spec import document
     from rollover.system.writing import notes
 
     path, chosen = scenario_with(scenario, set_)
     if posterior:
         installed()
-        if unfit(chosen):
-            message = "of drops only, got an overturn, whose draws are runs; without it, or calibrate --posterior"
-            raise InputError(Fault(file="--posterior", message=message))
+        check_is_drop(chosen, OPTION)
     measured = read(recordings, profile)
     check(chosen, measured)
     held = held_out(list(measured), hold_out or [], "--hold-out")

@@ -150,7 +150,8 @@ class Problem(Simulations):
             slope = self._time_derivative(r, candidates, x, shift, raw)
 
         worth = e.worth(discontinuities)
-        residual = e.marginalised(worth * (self.measured[r] - y))
+        marginalised = e.marginalised_beside(discontinuities)
+        residual = marginalised(worth * (self.measured[r] - y))
         far = max(1.0, float(np.sqrt(np.mean(residual * residual)))) if 0.0 < fd_step <= self.effort.fine else np.inf
         far = far if far < TUNING.local_slopes_below else np.inf  # from afar a wide step leads over ripples
 
@@ -175,7 +176,7 @@ class Problem(Simulations):
                 return None
             J[:, k] = column
         slope[discontinuities] = 0.0
-        slope = e.marginalised(worth * e.whitened(slope)) if clock else slope
+        slope = marginalised(worth * e.whitened(slope)) if clock else slope
         counts = heavy_tail(e, residual) if self.heavy_tailed else None
         if counts is not None:
             residual, J, slope = counts.samples * residual, counts.samples[:, None] * J, counts.samples * slope

@@ -99,6 +99,9 @@ class Tests:
         else:
             fits = [shown.fit((rival,), place, rounds=TUNING.rounds, width=1) for _, place in nearest[: TUNING.starts]]
             best = min((f for f in fits if f is not None), key=lambda f: f.total, default=None)
+            if best is not None:  # noise-free, a search ends where a round gains less than noise would hide: too early
+                ended = shown.fit((rival,), best.x, rounds=TUNING.rounds, finely=True)
+                best = best if ended is None else min(best, ended, key=lambda f: f.total)
             least, x_rival = (far, ()) if best is None else (min(best.total, far), best.x)
         return Apart(noncentrality=least, probability=choice(least, far), x=x_rival)
 

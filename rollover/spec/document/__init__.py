@@ -12,7 +12,7 @@ from typing import Any
 from rollover.spec.document.annotated import annotated
 from rollover.spec.document.check import check
 from rollover.spec.document.exchange import Itself, exchanged, value_at
-from rollover.spec.document.include import beside, expand, find, headings, named, shipped_folder
+from rollover.spec.document.include import beside, expand, find, headings, named, shipped_folder, stated_kind
 from rollover.spec.document.replace import parse_setting, replaced
 from rollover.spec.document.resolved import Leaf, content_hash, dump, paths, to_mapping, unit_at
 from rollover.spec.document.schema import schema
@@ -47,6 +47,7 @@ __all__ = [
     "shipped_folder",
     "shown",
     "slot_of",
+    "stated_kind",
     "to_mapping",
     "unit_at",
     "value_at",

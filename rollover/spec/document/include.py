@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +10,7 @@ from pathlib import Path
 from rollover.spec.document import grids
 from rollover.spec.document.slot import Slot
 from rollover.spec.document.tree import Node, read, shown
-from rollover.system.errors import Fault, InputError, hint, nearest
+from rollover.system.errors import Fault, InputError, excerpt, hint, nearest
 
 BASE = "base"
 ENDINGS = (".yaml", ".yml")
@@ -64,6 +64,15 @@ def headings(path: Path) -> dict[str, Node]:
             raise _missing(base, BASE)
         path = file
     return found
+
+
+def stated_kind(keys: Mapping[str, Node], allowed: Iterable[str]) -> str | None:
+    """The word under `kind` in a file's `headings`, None if there is none. Raises `InputError` for what is no word."""
+    said = keys["kind"].plain if "kind" in keys else None
+    if said is None or isinstance(said, str):
+        return said
+    message = f"not a word, got {excerpt(repr(said))}; {', '.join(allowed)} are allowed"
+    raise keys["kind"].place.fault("kind", message)
 
 
 @contextmanager
