@@ -78,7 +78,7 @@ def trace(recording: Recording, channel: str) -> Trace | None:
 
 
 def digit_of(values: Array) -> float:
-    """Step of the digits that the values (n,) of a channel lie on, at least that of floating point, 1e-9 of the largest.
+    """Step of the digits that the values (n,) of a channel lie on, at least `EXACT` of the largest.
 
     That is the smallest distance of two of them, or a part of it of which all others are multiples.
     """
