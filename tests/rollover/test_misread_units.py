@@ -1,4 +1,4 @@
-"""Units and clocks that were misread, channels that froze, rails of a sample or two: named in drops, never in clean ones."""
+"""Misread units and clocks, frozen channels, rails of two samples: named in drops, and never in clean ones."""
 
 from __future__ import annotations
 

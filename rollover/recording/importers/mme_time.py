@@ -12,6 +12,7 @@ INTERVAL = "sampling interval"
 FIRST = "time of first sample"
 MOST = 1.0  # s: SAE J211 asks for 600 Hz at least (CFC 60), static tests are read at 10 Hz
 PER_CLASS = 0.1  # samples a second and Hz of filter class, of which SAE J211 asks for 10
+LASTS = 10.0  # s: what is filtered by a class is an impact, of 0.3 s in a crash and 5 s in a rollover
 THOUSANDS = (1e3, 1e6)  # ms or us for s: two channels of as many samples cannot both last so long
 SAME = 1e-3  # relative, of what is written with four digits
 CURE = "seconds are needed, as ISO/TS 13499 has them"
@@ -31,7 +32,7 @@ def even_stamps(head: Mapping[str, str], cfc: int | None, count: int) -> NDArray
         raise ValueError(f"got {got!r}; a time in s, or an explicit reference channel") from None
     if not (np.isfinite(start) and 0.0 < step < np.inf):
         raise ValueError(f"got {step!r}; a time greater than 0 s")
-    if why := _implausible(step, cfc):
+    if why := _implausible(step, cfc, count):
         raise ValueError(f"got {got}, by which {count} samples last {step * count:g} s at {1.0 / step:.4g} Hz: {why}")
     for key in head:
         if key.startswith(INTERVAL) and key != INTERVAL and _stated(head, key).lower() not in ("", "s", "sec"):
@@ -42,9 +43,9 @@ def even_stamps(head: Mapping[str, str], cfc: int | None, count: int) -> NDArray
     return np.asarray(start + step * np.arange(count))
 
 
-def _implausible(step: float, cfc: int | None) -> str:
+def _implausible(step: float, cfc: int | None, count: int) -> str:
     most = most_step(cfc)
-    if step <= most:
+    if step <= most or (step <= MOST and step * count <= LASTS):
         return ""
     of = f"SAE J211 asks for {10 * cfc} Hz of CFC {cfc}" if cfc and most < MOST else f"{MOST:g} s at most is read"
     return f"{of}; {CURE}, not ms or us"
