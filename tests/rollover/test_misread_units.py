@@ -94,7 +94,7 @@ def test_gravity_in_an_accelerometer_is_told_at_rest() -> None:
 
 def test_gravity_is_told_from_three_axes_of_a_vehicle_on_its_side() -> None:
     random = np.random.default_rng(0)
-    time = np.arange(2000) * 1e-3
+    time = np.asarray(np.arange(2000) * 1e-3, dtype=np.float64)
     over = np.minimum(time / 0.8, 1.0) * 1.2  # rad
     axes = {"x": 0.0 * over, "y": 9.81 * np.sin(over), "z": 9.81 * np.cos(over)}
     named = {f"chassis/acceleration_{k}": v + 0.3 * random.normal(size=2000) for k, v in axes.items()}
@@ -147,7 +147,7 @@ def test_samples_that_a_logger_holds_are_no_rail() -> None:
 
 @pytest.mark.parametrize("digit", [1e-3, 1.0 / 4096.0, 9.80665e-3])
 def test_the_digit_of_a_channel(digit: float) -> None:
-    values = digit * np.random.default_rng(0).integers(-2000, 2000, 400)
+    values = np.asarray(digit * np.random.default_rng(0).integers(-2000, 2000, 400), dtype=np.float64)
     assert digit_of(values) == pytest.approx(digit)
     floats = np.random.default_rng(1).normal(size=400)
     assert digit_of(floats) == pytest.approx(1e-9 * np.abs(floats).max())

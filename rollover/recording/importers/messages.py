@@ -202,7 +202,7 @@ class Messages:
             if (instant := _instant(parts)) is not None:
                 yield name, instant
                 return
-            owners = next((parts[key] for key in _NAMES if _are_names(parts.get(key))), [])
+            owners: Sequence[str] = next((parts[key] for key in _NAMES if _are_names(parts.get(key))), ())
             for key, part in parts.items():
                 inner = f"{name}.{key}"
                 if owners and key not in _NAMES and _is_array(part) and len(part) == len(owners):
