@@ -88,7 +88,7 @@ def _read(text: str, *, alone: bool = False) -> Stamp | None:
             raise NotAStampError(f"not a date, got {text!r}: {e}") from None
         rest = re.sub(r"^\s*[Tt_]?\s*", "", rest[date.end() :])
     elif re.match(r"\d{1,2}/\d{1,2}/\d{2,4}|\d{1,2}-\d{1,2}-\d{2,4}(?!\d)", rest):
-        raise NotAStampError(f"not clear which is the day, the month and the year, got {text!r}; {FORMS}")
+        raise NotAStampError(f"not clear which is the day and which the month or year, got {text!r}; {FORMS}")
     clock = _CLOCK.match(rest)
     if clock is None and not (alone and date):
         return None
