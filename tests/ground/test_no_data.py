@@ -117,3 +117,15 @@ def test_a_mark_in_an_npy_file(tmp_path: Path) -> None:
     (tmp_path / "s.yaml").write_text(f"base: side_overturn.yaml\nground: {{surface: {surface}}}\n")
     with pytest.raises(InputError, match="row 7, column 5, got -32768"):
         load(tmp_path / "s.yaml")
+
+
+def test_a_list_of_points_is_no_grid(tmp_path: Path) -> None:
+    heights = terrain(0, n=6)
+    rows = [f"{0.5 * i},{0.5 * j},{heights[i, j]:.3f}" for i in range(6) for j in range(6)]
+    (tmp_path / "map.csv").write_text("\n".join(rows))
+    surface = "{kind: heightmap, heights: map.csv, spacing: [0.5, 0.5]}"
+    (tmp_path / "s.yaml").write_text(f"base: side_overturn.yaml\nground: {{surface: {surface}}}\n")
+    with pytest.raises(InputError, match="list of points x, y, z, got 36 rows of three"):
+        load(tmp_path / "s.yaml")
+    np.savetxt(tmp_path / "map.csv", heights[:, :3], delimiter=",")
+    load(tmp_path / "s.yaml")

@@ -221,3 +221,22 @@ def test_dates_of_cf_units_are_read_by_the_same_rules(text: str, seconds: float)
 def test_what_is_no_date_of_a_cf_unit(text: str) -> None:
     with pytest.raises(NotAStampError, match=r"not a (date|time of day), got"):
         instant(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "whole"),
+    [
+        ("11.11.20 13:25:02,005", "2020-11-11 13:25:02.005"),
+        ("01-May-24 10:00:00", "2024-05-01 10:00:00"),
+        ("31.12.99 23:59:59", "1999-12-31 23:59:59"),
+        ("1.2.68 00:00:00", "2068-02-01 00:00:00"),
+    ],
+)
+def test_years_of_two_digits_where_the_day_is_clear(text: str, whole: str) -> None:
+    assert moment(text).ns == moment(whole).ns
+
+
+@pytest.mark.parametrize("text", ["24-05-01 10:00:00", "05/01/24 10:00:00", "05-01-24 10:00:00", "1/5/2024 10:00:00"])
+def test_dates_that_may_be_read_two_ways_are_refused(text: str) -> None:
+    with pytest.raises(NotAStampError, match="not clear which is the day and which the month or year"):
+        moment(text)

@@ -194,3 +194,33 @@ def test_counts_of_64_bits_as_text(tmp_path: Path) -> None:
     found = named(write(tmp_path / "a.mcap", *messages), {"/f.at": "time, unit: ns", "/f.v": N})
     assert found.time == pytest.approx(1e-3 * np.arange(4), abs=1e-12)
     assert "time counts from 2024-05-01T08:00:00.000000001Z" in found.notes
+
+
+def joints(names: list[str], efforts: list[float]) -> dict[str, Any]:
+    return {"name": names, "effort": efforts}
+
+
+def test_entries_whose_names_change_places_go_by_name(tmp_path: Path) -> None:
+    """A joint state says in `name` whose the entries are, and may say it anew in every message."""
+    rows = [
+        ("/j", k, joints(["hip", "knee"], [k, 900.0]) if k < 3 else joints(["knee", "hip"], [900.0, k]))
+        for k in range(6)
+    ]
+    path = write(tmp_path / "j.mcap", *rows)
+    with pytest.raises(
+        InputError, match=r"/j.effort.0: its array changes its order, .* 'hip', then of 'knee'; /j.effort.hip"
+    ):
+        named(path, {"/j.effort.0": N})
+    assert named(path, {"/j.effort.hip": N})[FORCE].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    kept = write(tmp_path / "k.mcap", *rows[:3])
+    assert named(kept, {"/j.effort.0": N})[FORCE].tolist() == [0.0, 1.0, 2.0]
+    assert left_out(named(kept, {"/j.effort.hip": N})) == (3, 4)
+
+
+def test_a_joint_that_is_not_in_every_message_has_gaps_there(tmp_path: Path) -> None:
+    rows = [("/j", k, joints(["knee", "hip"], [900.0, k]) if k % 2 else joints(["hip"], [k])) for k in range(6)]
+    path = write(tmp_path / "j.mcap", *rows)
+    assert named(path, {"/j.effort.hip": N})[FORCE].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert named(path, {"/j.effort.knee": N})[FORCE].tolist() == [900.0, 900.0, 900.0]
+    with pytest.raises(InputError, match=r"'hip', then of 'knee'"):
+        named(path, {"/j.effort.0": N})

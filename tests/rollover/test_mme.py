@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from rollover.cli.main import app
 from rollover.recording import Recording
-from rollover.recording.importers import names_of_tests, read_recording
+from rollover.recording.importers import names_of_tests, read_recording, write_recording
 from rollover.system.errors import InputError
 
 CASES = Path(__file__).parent / "cases"
@@ -318,3 +318,65 @@ def test_all_that_a_test_holds_is_read_or_named(tmp_path: Path, packed: bool) ->
     found = read(path)
     assert len(found.channels) == 1
     assert found.notes == (f"5 of 6 columns left out, without a description: {', '.join(others)}",)
+
+
+# ---- clocks
+
+
+@pytest.mark.parametrize(
+    ("step", "more", "words"),
+    [
+        (100.0, {}, "line 7: Sampling interval: got 100.0, by which 400 samples last 40000 s"),
+        (0.1, {}, "SAE J211 asks for 10000 Hz of CFC 1000; seconds are needed"),
+        (1e-4, {"Sampling_interval_unit": "ms"}, "with 'sampling interval unit' 'ms'; seconds are needed"),
+        (1e-4, {"Sampling_rate": "1000"}, "with 'sampling rate' '1000', which is not 1 over it"),
+    ],
+)
+def test_an_interval_that_cannot_be_seconds_is_refused(
+    tmp_path: Path, step: float, more: dict[str, str], words: str
+) -> None:
+    path = made(tmp_path, channel(UP, list(range(400)), step=step, **more))
+    with pytest.raises(InputError, match=re.escape(words)):
+        read(path)
+
+
+def test_intervals_that_are_seconds_are_read(tmp_path: Path) -> None:
+    """A static test of 1 h at 10 Hz, unfiltered; a rate that agrees."""
+    slow = channel("11ROPS000000FOR0", list(range(36_000)), "N", step=0.1)
+    assert read(made(tmp_path, slow)).time[-1] == pytest.approx(3599.9)
+    agreed = channel(UP, list(range(400)), step=1e-4, Sampling_rate="10000", Sampling_interval_unit="s")
+    assert read(made(tmp_path, agreed, name="T2")).time[-1] == pytest.approx(0.0399)
+
+
+def test_two_channels_cannot_last_a_thousand_times_as_long(tmp_path: Path) -> None:
+    other = channel("11VEHCCG0000ACX0", list(range(400)), step=0.1)
+    with pytest.raises(InputError, match=r"got 0.1 in T1.002, line 7 and 0.0001 in T1.001, line 7"):
+        read(made(tmp_path, channel(UP, list(range(400)), step=1e-4), other))
+    slower = channel("11VEHCCG0000ACX0", list(range(400)), step=2e-3)
+    assert read(made(tmp_path, channel(UP, list(range(400)), step=1e-4), slower, name="T2")).time[-1] == 0.798
+
+
+def test_what_is_sampled_slowly_is_written_with_its_stamps(tmp_path: Path) -> None:
+    slow = Recording(title="slow", time=np.arange(50) * 5.0, channels={Z: np.sin(np.arange(50))}, cfc={Z: 60})
+    write_recording(slow, tmp_path / "slow.mme")
+    assert read(tmp_path / "slow.mme").time.tolist() == slow.time.tolist()
+
+
+@pytest.mark.parametrize(("code", "head", "taken"), [("0", "180", 180), ("C", "180", 180), ("C", "600", None)])
+def test_the_filter_class_of_code_and_head(tmp_path: Path, code: str, head: str, taken: int | None) -> None:
+    found = read(made(tmp_path, channel(UP[:15] + code, [1, 2, 3], Channel_frequency_class=head)))
+    assert found.cfc.get(Z) == taken
+    assert any("neither is taken" in note for note in found.notes) == (taken is None)
+
+
+def test_files_of_an_archive_that_belong_to_no_test_are_named(tmp_path: Path) -> None:
+    folder = made(tmp_path, channel(UP, [1, 2, 3]))
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        for file in sorted(folder.rglob("*.*")):
+            archive.write(file, file.relative_to(tmp_path))
+        archive.writestr("T1/readme.txt", "words")
+        archive.writestr("inner.zip", b"another test")
+        archive.writestr("T1/Movie/a.avi", b"pictures")
+    assert [n for n in read(tmp_path / "a.zip").notes if "no test" in n] == [
+        "2 of 6 files in it belong to no test: inner.zip, T1/Movie/a.avi"
+    ]

@@ -310,3 +310,19 @@ def test_blank_lines_are_no_samples_that_a_rate_may_count(tmp_path: Path, blank:
 def test_an_encoding_that_is_none_is_refused_with_its_cure(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match=r"encoding: unknown, got .*; such as utf-8, cp1252, utf-16"):
         read(tmp_path, "v.txt", TABBED, TIME_AND_X, f'encoding: "{name}"')
+
+
+@pytest.mark.parametrize("first", ["sep=;", '"sep=;"', "SEP=;"])
+@pytest.mark.parametrize("csv", ["", 'delimiter: ";", names_row: 2', 'delimiter: ";", decimal: ","'])
+def test_the_line_that_excel_begins_with(tmp_path: Path, first: str, csv: str) -> None:
+    mark = "," if "decimal" in csv else "."
+    text = first + "\nt;a\n" + "".join(f"{t:.4f};{a:.4f}\n".replace(".", mark) for t, a in ROWS[:50])
+    about = "  t: {channel: time, unit: s}\n  a: {channel: rops/force, unit: N}\n"
+    found = read(tmp_path, "e.csv", text, about, csv=csv)
+    assert found[FORCE] == pytest.approx([a for _, a in ROWS[:50]], abs=1e-4)
+    assert "sep=; in its first line says what stands between cells" in found.notes
+
+
+def test_a_delimiter_that_the_first_line_contradicts_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"csv.delimiter: e.csv says sep=; in its first line, got '\|'"):
+        read(tmp_path, "e.csv", "sep=;\nt;a\n0;1\n1;2\n", TIME_AND_X, csv='delimiter: "|"')

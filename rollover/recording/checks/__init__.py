@@ -11,12 +11,14 @@ from rollover.recording import Recording
 from rollover.recording.attitude import continuous, means_over_wraps, on_other_branch
 from rollover.recording.checks.angles import is_of_means, wraps
 from rollover.recording.checks.finding import Finding, Trace, instant, trace, when
+from rollover.recording.checks.frozen import frozen
 from rollover.recording.checks.kinematic import disagreements
 from rollover.recording.checks.leaps import leaps
 from rollover.recording.checks.levels import free_fall, rest
 from rollover.recording.checks.offsets import VEHICLE, polarity, zero_offsets
 from rollover.recording.checks.rails import rails, shared
 from rollover.recording.checks.samples import clipping, gaps, spikes, stuck
+from rollover.recording.checks.scales import scales
 from rollover.recording.checks.timebase import MOVING, lost, stamps
 from rollover.recording.noise_floor import NoiseFloor
 from rollover.recording.time_stamps import from_first, is_far
@@ -50,6 +52,8 @@ def prechecks(
     mass = float(stated) if mass is None and isinstance(stated, (int, float)) else mass
     found = [*free_fall(traces, gravity), *rest(traces, mass, gravity), *disagreements(traces, seed=seed)]
     found += zero_offsets(traces, mass, gravity, {f.channel for f in found if f.check == "free-fall"})
+    proper = {name for name, sensor in recording.sensors.items() if sensor.gravity == "proper"}
+    found += scales(traces, recording.conditions, mass, gravity, proper)
     is_vehicle = any(name.startswith(VEHICLE) for name in traces)
     over, turned = means_over_wraps(recording), on_other_branch(recording)
     none = np.zeros(recording.time.size, dtype=bool)
@@ -66,6 +70,7 @@ def prechecks(
             *polarity(t, unit),
             *lost(t, unit),
             *stuck(t, unit),
+            *frozen(t, unit),
             *(g for g in gaps(t) if not is_of_means(g, read, means)),
             *spikes(t, unit, among_contacts=is_vehicle and not name.endswith(MOVING)),
             *leaps(t, unit, recording.cfc.get(name)),

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import pdtrc
 
-from rollover.recording.checks.finding import Finding, Trace
+from rollover.recording.checks.finding import EXACT, Finding, Trace, digit_of
 from rollover.spec.channels import UNITS, describe
 
 Array = NDArray[np.float64]
 CHANCE = 1e-4  # that a clean end of a channel is called a rail: 1 in 500 recordings of ten channels
 BELOW = 20  # values below the largest, that say how dense they lie there
-EXACT = 1e-9  # of a value: what is exactly alike, or exactly round, after its unit was changed
+SMOOTH = 5.0  # times as often as values at large, that the two samples about a parabola's top share a digit
 BOUNDED = ("chassis/quaternion", "ground/contact_area")  # end at one value by what they are
 ANGLES = "rad"  # turn over at 180 degrees
 
@@ -41,11 +41,14 @@ def rails(t: Trace, unit: str, stated: set[float]) -> Iterator[Finding]:
         if not at.size:
             continue
         expected = _expected(x, extreme)
-        by_chance = float(pdtrc(at.size - 2, expected)) if at.size > 1 else 1.0
+        count = at.size if _holds(x, extreme) else int(np.sum(np.abs(x - extreme) <= EXACT * extreme))
+        expected *= SMOOTH if count > at.size else 1.0
+        by_chance = float(pdtrc(count - 2, expected)) if count > 1 else 1.0
         value = sign * extreme
         if by_chance < CHANCE:
-            what = f"{at.size} separate peaks end at exactly {value:.6g} {unit}"
-        elif unit != ANGLES and (full := _full_scale(extreme, _digit(x), unit)) and _stands_over(x, extreme):
+            peaks = f"{at.size} separate peaks end" if at.size > 1 else f"its peak ends, in {count} samples,"
+            what = f"{peaks} at exactly {value:.6g} {unit}"
+        elif unit != ANGLES and (full := _full_scale(extreme, digit_of(x), unit)) and _stands_over(x, extreme):
             what = f"its peak reads exactly {'-' if sign < 0.0 else ''}{full}, a full scale's round number"
         else:
             continue
@@ -128,16 +131,15 @@ def _peaks_at(x: Array, extreme: float) -> NDArray[np.int64]:
     starts, ends = edges[::2], edges[1::2]
     inside = (starts > 0) & (ends < x.size)
     starts, ends = starts[inside], ends[inside]
-    least = 1.5 * _digit(x)
+    least = 1.5 * digit_of(x)
     steep = (extreme - x[starts - 1] > least) & (extreme - x[ends] > least)
     return np.asarray(starts[steep])
 
 
-def _digit(x: Array) -> float:
-    """Smallest distance of two values of a channel, at least that of floating point."""
-    apart = np.diff(np.unique(x))
-    least = EXACT * float(np.abs(x).max())
-    return float(np.min(apart[apart > least], initial=np.inf)) if bool(np.any(apart > least)) else least
+def _holds(x: Array, extreme: float) -> bool:
+    """Whether a channel repeats samples elsewhere, as one does that is read more often than it is measured."""
+    same = np.diff(x) == 0.0
+    return bool(np.any(same & (x[1:] != 0.0) & (np.abs(x[1:] - extreme) > EXACT * extreme)))
 
 
 def _expected(x: Array, extreme: float) -> float:
@@ -145,7 +147,7 @@ def _expected(x: Array, extreme: float) -> float:
     below = np.sort(x[extreme - x > EXACT * extreme])[-BELOW:]
     if below.size < BELOW:
         return math.inf
-    return BELOW * _digit(x) / float(extreme - below[0])
+    return BELOW * digit_of(x) / float(extreme - below[0])
 
 
 def _stands_over(x: Array, extreme: float) -> bool:

@@ -24,11 +24,11 @@ from rollover.recording.importers.date_times import (
     whole_seconds,
 )
 from rollover.recording.importers.importer import Importer
-from rollover.recording.importers.sidecar import DATE_TIME, Column, Described, Profile
+from rollover.recording.importers.sidecar import DATE_TIME, Column, Csv, Described, Profile
 from rollover.recording.importers.signals import Signal, assemble
 from rollover.recording.importers.soundness import RATE_INSTEAD
 from rollover.recording.tables import blank_lines, csv_heading, first_rows, is_number, line_of_row, read_columns
-from rollover.recording.text_rows import Dialect
+from rollover.recording.text_rows import Dialect, lines_of
 from rollover.spec import units
 from rollover.spec.channels import UNITS
 from rollover.system.errors import Fault, InputError
@@ -103,7 +103,16 @@ def _column(values: np.ndarray, unit: str, dialect: Dialect) -> Signal:
 def _dialect(path: Path, profile: Described) -> tuple[Dialect, list[str]]:
     """How the file is written, and what was found out about it."""
     assert isinstance(profile.about, Profile)
-    how = profile.about.csv
+    how, notes = profile.about.csv, []
+    mark = _separator(path, Dialect(encoding=how.encoding, comment=how.comment))
+    if mark:
+        if how.delimiter not in (Csv().delimiter, mark):
+            what = f"csv.delimiter: {path.name} says sep={mark} in its first line, got {how.delimiter!r}"
+            raise InputError(
+                Fault(file=profile.file, path="csv.delimiter", message=f"{what}; {mark!r}, or leave it out")
+            )
+        how = replace(how, delimiter=mark, names_row=2 if how.names_row is None else how.names_row)
+        notes = [f"sep={mark} in its first line says what stands between cells"]
     names_row = 1 if how.names_row is None else how.names_row
     last = (how.data_row or (how.units_row or names_row) + 1) - 1
     dialect = Dialect(
@@ -122,7 +131,13 @@ def _dialect(path: Path, profile: Described) -> tuple[Dialect, list[str]]:
         bare = [cell for row in first_rows(path, replace(dialect, named=False), 1) for cell in row]
         if bare and all(is_number(cell, how.decimal) for cell in bare) and not set(profile.columns) <= set(names):
             return replace(dialect, named=False), ["the first row holds numbers and no names: columns are 1, 2, ..."]
-    return dialect, []
+    return dialect, notes
+
+
+def _separator(path: Path, dialect: Dialect) -> str:
+    """What a first line `sep=;`, as Excel reads and writes it, says to stand between cells; else nothing."""
+    first = next(iter(lines_of(path, dialect)), (0, ""))[1].strip().strip('"')
+    return first[4:] if re.fullmatch(r"(?i)sep=[;,|\t]", first) or first.lower() == "sep=" else ""
 
 
 def in_brackets(name: str) -> str:

@@ -20,9 +20,9 @@ EXACT = 2**53  # ns: the longest time (104 days) that float64 holds to the nanos
 FORMS = "such as 2020-11-11 13:25:02.005, 2020-11-11T13:25:02Z, 11.11.2020 13:25:02,005 or 13:25:02.005"
 _DATE = re.compile(
     r"(?P<y>\d{4})(?P<_>[-/.])(?P<m>\d{1,2})(?P=_)(?P<d>\d{1,2})"
-    r"|(?P<d2>\d{1,2})\.(?P<m2>\d{1,2})\.(?P<y2>\d{4})"
+    r"|(?P<d2>\d{1,2})\.(?P<m2>\d{1,2})\.(?P<y2>\d{4}|\d{2}(?!\d))"
     r"|(?P<y3>\d{4})(?P<m3>\d{2})(?P<d3>\d{2})"
-    r"|(?P<d4>\d{1,2})[- ](?P<m4>[A-Za-z]{3})[- ](?P<y4>\d{4})"
+    r"|(?P<d4>\d{1,2})[- ](?P<m4>[A-Za-z]{3})[- ](?P<y4>\d{4}|\d{2}(?!\d))"
 )
 _CLOCK = re.compile(
     r"(?P<h>\d{1,2}):(?P<min>\d{1,2})(?::(?P<s>\d{1,2})(?:[.,](?P<f>\d+)|:(?P<ms>\d{3}))?)?(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?"
@@ -83,12 +83,12 @@ def _read(text: str, *, alone: bool = False) -> Stamp | None:
         parts = {k.rstrip("234"): v for k, v in date.groupdict().items() if v is not None}
         month = parts["m"] if parts["m"].isdigit() else str(1 + _month(parts["m"], text))
         try:
-            day = dt.date(int(parts["y"]), int(month), int(parts["d"])).toordinal()
+            day = dt.date(_year(parts["y"]), int(month), int(parts["d"])).toordinal()
         except ValueError as e:
             raise NotAStampError(f"not a date, got {text!r}: {e}") from None
         rest = re.sub(r"^\s*[Tt_]?\s*", "", rest[date.end() :])
-    elif re.match(r"\d{1,2}/\d{1,2}/\d{2,4}", rest):
-        raise NotAStampError(f"not clear which is the day and which the month, got {text!r}; {FORMS}")
+    elif re.match(r"\d{1,2}/\d{1,2}/\d{2,4}|\d{1,2}-\d{1,2}-\d{2,4}(?!\d)", rest):
+        raise NotAStampError(f"not clear which is the day and which the month or year, got {text!r}; {FORMS}")
     clock = _CLOCK.match(rest)
     if clock is None and not (alone and date):
         return None
@@ -155,6 +155,12 @@ def spelt(stamp: Stamp) -> str:
     if not stamp.dated:
         return f"{clock} (a time of day)"
     return f"{dt.date.fromordinal(day).isoformat()}T{clock}" + ("Z" if stamp.zoned else " (local time as it stands)")
+
+
+def _year(digits: str) -> int:
+    """A year of four digits, or of two as POSIX has it: 69 to 99 are 1969 to 1999, 00 to 68 are 2000 to 2068."""
+    year = int(digits)
+    return year if len(digits) == 4 else year + (1900 if year > 68 else 2000)
 
 
 def _month(word: str, text: str) -> int:

@@ -21,7 +21,8 @@ from rollover.recording import Recording
 from rollover.recording.importers import mme_codes as codes
 from rollover.recording.importers.importer import Importer
 from rollover.recording.importers.mme_archive import content, names_in
-from rollover.recording.importers.mme_listing import promised
+from rollover.recording.importers.mme_listing import promised, stray
+from rollover.recording.importers.mme_time import INTERVAL, contradiction, even_stamps, most_step
 from rollover.recording.importers.polarity import sign
 from rollover.recording.importers.sidecar import Described
 from rollover.recording.importers.signals import Signal, assemble, left_out
@@ -31,7 +32,6 @@ from rollover.system.errors import Fault, InputError, seen
 from rollover.system.writing import check_free, put, whole
 
 NOVALUE = "NOVALUE"
-MOST_STEP = 1e6  # s, 12 days: a longer interval is a unit misread, as microseconds for seconds
 _HEADER = re.compile(r"([^:]*?)\s*:(.*)")
 _CHANNEL_FILE = re.compile(r"(.*)\.\d{3,}$")
 _NUMBER = re.compile(r"\s*[-+]?(\d|\.\d|nan|inf|novalue)", re.IGNORECASE)
@@ -39,11 +39,12 @@ _NUMBER = re.compile(r"\s*[-+]?(\d|\.\d|nan|inf|novalue)", re.IGNORECASE)
 
 @dataclass(frozen=True, kw_only=True)
 class _Channel:
-    """A channel file: its head, its values, and what is wrong with it, if anything."""
+    """A channel file: its head and the lines of that, its values, and what is wrong with it, if anything."""
 
     file: str
     head: Mapping[str, str]
     values: NDArray[np.float64]
+    lines: Mapping[str, int]
     wrong: str = ""
 
     @property
@@ -99,6 +100,7 @@ def _recording(place: Path, path: Path, chosen: str, profile: Described | None) 
     if not names:
         _refuse(path, f"no channels, got no Channel/*.001 beside {chosen}")
     channels = [_channel(place, name) for name in names]
+    _check_clocks(place, channels)
     signals = _signals(place, channels, profile)
     title = _value(test, "title") or _value(test, "type of the test") or PurePosixPath(chosen).stem
     laboratory = _value(test, "laboratory name")
@@ -109,6 +111,7 @@ def _recording(place: Path, path: Path, chosen: str, profile: Described | None) 
     head = _header(place, listing, content(place, listing))[0] if listing else {}
     held = [(channel.file, channel.code) for channel in channels]
     notes = (*found.notes, *promised(PurePosixPath(listing or chosen).name, {**test, **head}, held))
+    notes += tuple(stray(names_in(place))) if place.is_file() else ()
     flipped = {name: sign(name) * values for name, values in found.channels.items() if sign(name) < 0.0}
     return replace(found, title=title, source=source, channels={**found.channels, **flipped}, notes=notes)
 
@@ -183,7 +186,7 @@ def _files(recording: Recording, name: str) -> dict[str, str]:
     time = recording.time
     step = (time[-1] - time[0]) / (time.size - 1) if time.size > 1 else 1.0
     even = bool(np.all(np.abs(time - (time[0] + step * np.arange(time.size))) < 1e-12))
-    regular = even and step < MOST_STEP
+    regular = even and step <= min(most_step(cfc) for cfc in (None, *recording.cfc.values()))
     table = {n: sign(n) * values for n, values in recording.channels.items()}
     if not regular:
         table = {"time": time, **table}
@@ -222,8 +225,8 @@ def _text(head: Mapping[str, str]) -> str:
     return "".join(f"{key:<28}:{value}\n" for key, value in head.items())
 
 
-def _header(place: Path, name: str, data: bytes) -> tuple[dict[str, str], list[str], int]:
-    """Head of a file, its other lines, and the number of the first of them."""
+def _header(place: Path, name: str, data: bytes) -> tuple[dict[str, str], list[str], int, dict[str, int]]:
+    """Head of a file, its other lines, the number of the first of them, and those of the head."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -232,17 +235,18 @@ def _header(place: Path, name: str, data: bytes) -> tuple[dict[str, str], list[s
         _refuse(place, f"{name}: not a text file, got a NUL byte")
     lines = text.splitlines()
     head: dict[str, str] = {}
+    at: dict[str, int] = {}
     for i, line in enumerate(lines):
         match = _HEADER.fullmatch(line)
         if match is None and (_NUMBER.match(line) or line.strip().lower() == "start of data"):
-            return head, lines[i:], i + 1
-        if match:
-            head.setdefault(match[1].strip().lower(), match[2].strip())
-    return head, [], len(lines)
+            return head, lines[i:], i + 1, at
+        if match and (key := match[1].strip().lower()) not in head:
+            head[key], at[key] = match[2].strip(), i + 1
+    return head, [], len(lines), at
 
 
 def _channel(place: Path, name: str) -> _Channel:
-    head, lines, first = _header(place, name, content(place, name))
+    head, lines, first, at = _header(place, name, content(place, name))
     wrong, values = "", np.empty(0)
     try:
         values = _numbers(place, name, head, lines, first)
@@ -251,7 +255,7 @@ def _channel(place: Path, name: str) -> _Channel:
             _refuse(place, f"{name}: Channel code: got {code!r}; 16 letters and digits are needed")
     except InputError as e:
         wrong = e.faults[0].message
-    return _Channel(file=PurePosixPath(name).name, head=head, values=values, wrong=wrong)
+    return _Channel(file=PurePosixPath(name).name, head=head, values=values, lines=at, wrong=wrong)
 
 
 def _numbers(place: Path, name: str, head: Mapping[str, str], lines: list[str], first: int) -> NDArray[np.float64]:
@@ -285,7 +289,29 @@ def _signal(place: Path, channel: _Channel, channels: list[_Channel]) -> Signal:
     if dimension == "TI" or channel.known == "time":
         return Signal(values=channel.values, unit=unit)
     time = _time(place, channel, channels)
-    return Signal(values=channel.values, unit=unit, time=time, cfc=codes.cfc_of(channel.code), channel=channel.known)
+    cfc, note = _cfc(channel)
+    return Signal(values=channel.values, unit=unit, time=time, cfc=cfc, channel=channel.known, notes=note)
+
+
+def _cfc(channel: _Channel) -> tuple[int | None, tuple[str, ...]]:
+    """Filter class by the last letter of the code, else by the head; none where they differ, which is noted."""
+    by_code, stated = codes.cfc_of(channel.code), _value(channel.head, "channel frequency class")
+    by_head = int(stated) if stated.isdigit() and int(stated) in codes.FILTERS.values() else None
+    if by_code is not None and by_head is not None and by_code != by_head:
+        note = f"its code says CFC {by_code}, its head CFC {by_head}: neither is taken, `cfc` in a profile says which"
+        return None, (note,)
+    return by_code if by_code is not None else by_head, ()
+
+
+def _check_clocks(place: Path, channels: list[_Channel]) -> None:
+    """Refuse two channels of as many samples of which one has ms or us for s. Raises `InputError`."""
+    apart = contradiction((channel.file, channel.head, channel.values.size) for channel in channels)
+    if apart is None:
+        return
+    short, long = (next(c for c in channels if c.file == file) for file in apart)
+    steps = [f"{c.head[INTERVAL]} in {c.file}, line {c.lines[INTERVAL]}" for c in (long, short)]
+    what = f"got {steps[0]} and {steps[1]}, for {long.values.size} samples each: ms or us for s in one of them"
+    _refuse(place, f"{long.file}: Sampling interval: {what}; seconds in both")
 
 
 def _time(place: Path, channel: _Channel, channels: list[_Channel]) -> NDArray[np.float64]:
@@ -293,7 +319,7 @@ def _time(place: Path, channel: _Channel, channels: list[_Channel]) -> NDArray[n
     if _is_explicit(channel):
         wanted = _reference(channel)
         for other in channels:
-            if wanted and wanted in (other.code, other.head.get("name of the channel", "")):
+            if wanted and wanted.lower() in (other.code.lower(), other.head.get("name of the channel", "").lower()):
                 if other.wrong:
                     _refuse(place, other.wrong)
                 if other.values.size != channel.values.size:
@@ -305,13 +331,10 @@ def _time(place: Path, channel: _Channel, channels: list[_Channel]) -> NDArray[n
                     _refuse(place, f"{other.file}: Unit: {e}")
         _refuse(place, f"{channel.file}: Reference channel name: no such channel, got {wanted!r}; the code of another")
     try:
-        step, start = float(head["sampling interval"]), float(_value(head, "time of first sample") or 0.0)
-    except (KeyError, ValueError):
-        got = head.get("sampling interval", "nothing")
-        _refuse(place, f"{channel.file}: Sampling interval: got {got!r}; a time in s, or an explicit reference channel")
-    if not (np.isfinite(start) and 0.0 < step < MOST_STEP):
-        _refuse(place, f"{channel.file}: Sampling interval: got {step!r}; a time greater than 0 s")
-    return np.asarray(start + step * np.arange(channel.values.size))
+        return even_stamps(head, _cfc(channel)[0], channel.values.size)
+    except ValueError as e:
+        at = channel.lines.get(INTERVAL)
+        _refuse(place, f"{channel.file}: {f'line {at}: ' if at else ''}Sampling interval: {e}")
 
 
 def _is_explicit(channel: _Channel) -> bool:

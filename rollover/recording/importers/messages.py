@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ _LONGEST = 256  # entries of an array that become columns unasked: joints and wh
 _COUNTED = 1000  # values after which their sum is looked at
 _TURNS = 1000  # of publishers of a topic that are kept in mind
 _IN_LIST = 40  # bytes that a value takes: a Python number, its place in two lists
+_NAMES = ("name", "names", "joint_names")  # whose entries say of which part the entries of the arrays beside are
 _SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nanosecs", "nsec", "nsecs")
 
 
@@ -60,6 +61,8 @@ class Messages:
         self._logged: dict[str, list[int]] = {}
         self._stamps_in: dict[str, str] = {}  # topic -> the first of its fields that is a stamp
         self._topic_of: dict[str, str] = {}
+        self._owners: dict[str, str] = {}  # entry of an array -> what the names beside it say that it is of
+        self._reordered: dict[str, str] = {}  # the same -> what it is of later on
         self._sources: dict[str, list[int]] = {}  # topic -> who wrote its messages, in the order of their turns
         self._count = 0
         self._claimed = Budget(path)
@@ -105,6 +108,12 @@ class Messages:
                 continue
             if not column.at:
                 found[name] = Signal(values=np.empty(0))
+                continue
+            if name in self._reordered:
+                both = f"{self._owners[name]!r}, then of {self._reordered[name]!r}"
+                what = f"its array changes its order, got first the entry of {both}"
+                cure = f"{name.rpartition('.')[0]}.{self._owners[name]}: by its name"
+                found[name] = Signal(values=np.empty(0), unreadable=f"{what}; {cure}")
                 continue
             turns = self._sources[topic]
             if len(turns) > len(set(turns)):  # a recorder that began anew takes one turn after the other
@@ -193,8 +202,24 @@ class Messages:
             if (instant := _instant(parts)) is not None:
                 yield name, instant
                 return
+            owners: Sequence[str] = next((parts[key] for key in _NAMES if _are_names(parts.get(key))), ())
             for key, part in parts.items():
-                yield from self._leaves(f"{name}.{key}", part)
+                inner = f"{name}.{key}"
+                if owners and key not in _NAMES and _is_array(part) and len(part) == len(owners):
+                    yield from self._owned(inner, part, owners)
+                else:
+                    yield from self._leaves(inner, part)
+
+    def _owned(self, name: str, values: Any, owners: Sequence[str]) -> Iterator[tuple[str, Any]]:
+        """Entries of an array whose order is that of names: by the name where a profile asks for it, else by place."""
+        for k, (value, owner) in enumerate(zip(values, owners, strict=True)):
+            if f"{name}.{owner}" in self._wanted:
+                yield from self._leaves(f"{name}.{owner}", value)
+                continue
+            inner = f"{name}.{k}"
+            if self._owners.setdefault(inner, owner) != owner:
+                self._reordered.setdefault(inner, owner)
+            yield from self._leaves(inner, value)
 
     def _entries(self, name: str, values: Any) -> Iterator[tuple[str, Any]]:
         if len(values) > _LONGEST and name not in self._on_the_way:
@@ -204,6 +229,15 @@ class Messages:
             inner = f"{name}.{k}"
             if len(values) <= _LONGEST or inner in self._wanted or inner in self._on_the_way:
                 yield from self._leaves(inner, value)
+
+
+def _is_array(value: Any) -> bool:
+    return isinstance(value, (list, tuple, np.ndarray)) and len(value) <= _LONGEST
+
+
+def _are_names(value: Any) -> bool:
+    """Whether these are texts that differ, one for each entry of the arrays beside them."""
+    return _is_array(value) and all(isinstance(v, str) for v in value) and 0 < len(set(value)) == len(value)
 
 
 def _parts(value: Any) -> dict[str, Any]:

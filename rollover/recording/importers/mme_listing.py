@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
+
+WORDS = (".txt", ".md", ".pdf", ".doc", ".docx", ".html", ".rtf", ".xml")  # about a test, and no samples of it
 
 _ENTRY = re.compile(r"name of channel\s*(\d+)")
 
@@ -38,3 +41,17 @@ def promised(name: str, head: Mapping[str, str], held: Sequence[tuple[str, str]]
     if extra:
         notes.append(f"{len(extra)} of {len(held)} files are not in {name}: {', '.join(reversed(extra))}")
     return notes
+
+
+def stray(names: Sequence[str]) -> list[str]:
+    """A note of the files of an archive that stand neither beside the file of a test nor in its folder of channels."""
+    homes = {PurePosixPath(name).parent for name in names if name.lower().endswith(".mme")}
+    left = []
+    for name in names:
+        path = PurePosixPath(name)
+        is_channel = path.parent.name.lower() == "channel" and path.parent.parent in homes
+        is_beside = path.parent in homes and path.suffix.lower() in (".mme", *WORDS)
+        if not (is_channel or is_beside):
+            left.append(name)
+    shown = ", ".join(left[:12]) + (f" and {len(left) - 12} more" if len(left) > 12 else "")
+    return [f"{len(left)} of {len(names)} files in it belong to no test: {shown}"] if left else []

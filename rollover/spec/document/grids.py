@@ -40,9 +40,22 @@ def read(file: Path, node: Node, path: str) -> Node:
         for j, value in enumerate(row, 1):
             if not np.isfinite(value):
                 raise _no_height(Place(file=name, line=line, folder=file.parent), path, i, j, f"got {value!r}")
+    if _is_list_of_points([row for _, row in rows]):
+        what = f"{name} is a list of points x, y, z, got {len(rows)} rows of three"
+        cure = "a row of heights for each x, a height for each y, and their distances in spacing"
+        raise node.place.fault(path, f"{what}; {cure}")
     places = [Place(file=name, line=line, folder=file.parent) for line, _ in rows]
     nodes = tuple(planted(row, place) for (_, row), place in zip(rows, places, strict=True))
     return replace(node, value=nodes)
+
+
+def _is_list_of_points(rows: list[list[float]]) -> bool:
+    """Whether rows of three are the nodes of a grid one by one: each of several x once with each of several y."""
+    if len(rows) < 4 or {len(row) for row in rows} != {3}:
+        return False
+    xs, ys = {row[0] for row in rows}, {row[1] for row in rows}
+    pairs = {(row[0], row[1]) for row in rows}
+    return min(len(xs), len(ys)) > 1 and len(pairs) == len(rows) == len(xs) * len(ys)
 
 
 def _rows(file: Path, node: Node, path: str) -> Iterator[tuple[int | None, list[float]]]:
