@@ -43,6 +43,7 @@ DURATIONS = {
     "rops_drop": 0.5,
     "shaken_platform": 1.0,
     "side_overturn": 1.0,
+    "side_overturn_driver": 1.0,
     "side_overturn_slope": 1.0,
     "soil_trip": 1.0,
     "tractor_drop_corner": 0.5,

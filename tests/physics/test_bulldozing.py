@@ -1,0 +1,153 @@
+"""Soil that is pushed aside: Rankine's passive pressure by hand, a plate that ploughs, its energy, what is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ground.array import Elements
+from ground.bekker import BekkerWong
+from ground.friction import Bulldozing, Coulomb, JanosiHanamoto
+from rollover.assessment.ledger import closure
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
+from rollover.scenario import Scenario, load
+from rollover.spec.document import content_hash
+from rollover.spec.inertia import MassProperties
+from rollover.spec.initiation import Throw
+from rollover.spec.shapes import Box
+from rollover.spec.vehicle import RigidBody
+from rollover.system.errors import InputError
+
+SOIL = BekkerWong(cohesive_modulus=0.0, frictional_modulus=2.0e5, exponent=1.0, width=0.1)
+EARTH = Bulldozing(unit_weight=18_000.0, friction_angle_deg=30.0, cohesion=5000.0, surcharge=1000.0)
+LENGTH, WIDTH, MASS = 0.8, 0.4, 600.0
+
+
+def test_passive_pressure_by_hand() -> None:
+    """K_p = 3 at 30 deg. At 0.2 m: 18 000/2 x 0.04 x 3 + 1000 x 0.2 x 3 + 2 x 5000 x 0.2 x sqrt(3) = 5144.1 N/m."""
+    assert EARTH.passive == pytest.approx(3.0, rel=1e-12)
+    square, linear = EARTH.coefficients
+    assert square * 0.2**2 + linear * 0.2 == pytest.approx(1080.0 + 600.0 + 3464.1016, rel=1e-7)
+    # clay that does not drain, phi = 0: K_p = 1
+    assert Bulldozing(unit_weight=17e3, friction_angle_deg=0.0, cohesion=20e3).coefficients == pytest.approx(
+        (8500, 4e4)
+    )
+
+
+def ploughing(velocity: tuple[float, float], friction: Coulomb | JanosiHanamoto, integrator: str = "compiled") -> Run:
+    """A plate of 0.8 m by 0.4 m that sinks 92 mm by its weight, m g = A k_phi z, and slides on from there."""
+    sunk = MASS * 9.81 / (LENGTH * WIDTH * 2.0e5)
+    start = Throw(position=(0.0, 0.0, 0.001), velocity=(*velocity, 0.0))
+    scenario: Scenario = replace(
+        load("soil_trip"),
+        vehicle=RigidBody(
+            name="plate",
+            # its centre of mass at the depth of its sole's pressure: it does not pitch
+            whole=MassProperties(mass=MASS, centre_of_mass=(0.0, 0.0, 0.0), inertia=(1e5, 1e5, 1e5)),
+            outline=(Box(name="plate", low=(-LENGTH / 2, -WIDTH / 2, 0.0), high=(LENGTH / 2, WIDTH / 2, 0.5)),),
+            contact_spacing=0.02,
+        ),
+        initiation=start,
+    )
+    ground = replace(
+        scenario.ground,
+        elements=Elements(length=6.0, width=6.0, spacing=(0.05, 0.05)),
+        law=SOIL,
+        friction=friction,
+        co_moving_mass=replace(scenario.ground.co_moving_mass, fraction=0.0),
+    )
+    simulation = replace(scenario.simulation, duration=0.4, integrator=integrator)  # type: ignore[arg-type]
+    done = run(replace(scenario, ground=ground, simulation=simulation))
+    assert done.status == "done", done.sentence
+    assert float(done.recording["ground/sinkage"].max()) > sunk
+    return done
+
+
+def expected(run: Run, across: float) -> np.ndarray:
+    square, linear = EARTH.coefficients
+    z = run.recording["ground/sinkage"]
+    return np.asarray(across * (square * z + linear) * z)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "across"),
+    [
+        ((3.0, 0.0), WIDTH),
+        ((0.0, 3.0), LENGTH),
+        ((-3.0, 0.0), WIDTH),
+        ((2.0, 2.0), (LENGTH + WIDTH) / math.sqrt(2.0)),
+    ],
+)
+def test_a_plate_that_ploughs_meets_the_closed_form(velocity: tuple[float, float], across: float) -> None:
+    """F = b (1/2 gamma z^2 K_p + q z K_p + 2 c z sqrt(K_p)) at each sinkage, b across the motion; friction aside.
+
+    The plate's edge lies between those of elements most of the time, and takes in the row it has begun with: b by at
+    most one element of 0.05 m too large on either side.
+    """
+    done = ploughing(velocity, Coulomb(coefficient=0.0, bulldozing=EARTH))
+    force, sunk = done.recording["ground/force_tangential"], done.recording["ground/sinkage"]
+    # well in, and not lifting off
+    deep = (sunk > 0.05) & (done.recording["ground/force_normal"] > 0.2 * MASS * 9.81)
+    assert deep.sum() > 50
+    ratio = force[deep] / expected(done, across)[deep]
+    assert np.median(ratio) == pytest.approx(1.0, abs=0.13)
+    assert ratio.min() > 0.9
+    # it acts against the motion
+    speed = np.hypot(done.recording["chassis/velocity_x"], done.recording["chassis/velocity_y"])
+    assert speed[-1] < 0.9 * math.hypot(*velocity)
+
+
+@pytest.mark.parametrize("integrator", ["exudyn", "compiled"])
+@pytest.mark.parametrize(
+    "friction",
+    [
+        Coulomb(coefficient=0.3, bulldozing=EARTH),
+        JanosiHanamoto(cohesion=2000.0, friction_angle_deg=25.0, shear_modulus=0.01, bulldozing=EARTH),
+    ],
+)
+def test_what_it_takes_is_booked(friction: Coulomb | JanosiHanamoto, integrator: str) -> None:
+    done = ploughing((3.0, 0.0), friction, integrator)
+    plain = ploughing((3.0, 0.0), replace(friction, bulldozing=None), integrator)
+    assert closure(done).largest < 0.005
+    lost = [0.5 * MASS * (9.0 - r.recording["chassis/velocity_x"][-1] ** 2) for r in (done, plain)]
+    assert lost[0] > 1.3 * lost[1]
+    # 0.2 of the weight and more bears all the time: what is lost along x is what friction took
+    assert done.ledger["friction"] == pytest.approx(lost[0], rel=0.02)
+
+
+def test_none_is_as_before_in_numbers_and_hash() -> None:
+    scenario = load("soil_trip")
+    assert content_hash(scenario.replaced({"ground.friction.bulldozing": None})) == content_hash(scenario)
+    given = {"unit_weight": 15e3, "friction_angle_deg": 29.0, "cohesion": 1720.0}
+    pushed = scenario.replaced({"ground.friction.bulldozing": given})
+    assert pushed.ground.friction.bulldozing == Bulldozing(unit_weight=15e3, friction_angle_deg=29.0, cohesion=1720.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            {
+                "ground.law": {"kind": "hard"},
+                "ground.friction.bulldozing": {"unit_weight": 1e4, "friction_angle_deg": 30},
+            },
+            "ground.friction.bulldozing: ground that keeps no rut, got law.kind 'hard'",
+        ),
+        (
+            {"ground.friction.bulldozing": {"unit_weight": 0.0, "friction_angle_deg": 30.0}},
+            "ground.friction.bulldozing.unit_weight: out of bounds, got 0.0",
+        ),
+        (
+            {"ground.friction.bulldozing": {"unit_weight": 1e4, "friction_angle_deg": 75.0}},
+            "ground.friction.bulldozing.friction_angle_deg: out of bounds, got 75.0",
+        ),
+    ],
+)
+def test_wrong_bulldozing_is_one_line(changes: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError) as refused:
+        load("soil_trip").replaced(changes)
+    assert said in str(refused.value)
