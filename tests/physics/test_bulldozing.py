@@ -11,9 +11,15 @@ import pytest
 from ground.array import Elements
 from ground.bekker import BekkerWong
 from ground.friction import Bulldozing, Coulomb, JanosiHanamoto
+from ground.kernel import CELL, IDLE, LINE_F, LINE_K, LINE_Z, LOADING, MODE, NORMAL, PLOUGHED, SINKAGE
 from rollover.assessment.ledger import closure
+from rollover.dynamics.assembly import tables_of
+from rollover.dynamics.bodies import bodies_of
 from rollover.dynamics.result import Run
 from rollover.dynamics.simulate import run
+from rollover.kernels.forces import read_poses
+from rollover.kernels.ploughing import plough
+from rollover.kernels.tables import ACTIVE, SLOTS, handle
 from rollover.scenario import Scenario, load
 from rollover.spec.document import content_hash
 from rollover.spec.inertia import MassProperties
@@ -36,6 +42,61 @@ def test_passive_pressure_by_hand() -> None:
     assert Bulldozing(unit_weight=17e3, friction_angle_deg=0.0, cohesion=20e3).coefficients == pytest.approx(
         (8500, 4e4)
     )
+
+
+class Footprint:
+    """A footprint of 6 by 4 elements of 0.05 m under a body that slides, all of them 0.1 m deep."""
+
+    depth, square, linear = 0.1, *EARTH.coefficients
+
+    def __init__(self) -> None:
+        given = {"unit_weight": 18e3, "friction_angle_deg": 30.0, "cohesion": 5e3, "surcharge": 1e3}
+        scenario = load("soil_trip").replaced(
+            {"ground.friction.bulldozing": given, "ground.elements.spacing": [0.05, 0.05]}
+        )
+        self.t = t = tables_of(scenario, bodies_of(scenario.vehicle, scenario.ground.elements))
+        self.cells = [(30 + i, 40 + j) for i in range(6) for j in range(4)]
+        for slot, (i, j) in enumerate(self.cells):
+            self.put(slot, i, j, LOADING)
+            t.active[slot] = slot
+        t.counts[ACTIVE] = t.counts[SLOTS] = len(self.cells)
+
+    def put(self, slot: int, i: int, j: int, mode: int) -> None:
+        t = self.t
+        cell = i * int(t.grid_i[1]) + j
+        t.slot_of[cell], t.state[slot, CELL], t.state[slot, MODE] = slot, cell, mode
+        t.memory[slot, SINKAGE], t.memory[slot, NORMAL + 2] = self.depth, 1.0
+
+    def pushed(self, x: float, y: float) -> float:
+        read_poses(self.t.pose, np.zeros(6), np.array([x, y, -0.3, 0.0, 0.0, 0.0]))
+        plough(handle(self.t))
+        return float(self.t.memory[: len(self.cells), PLOUGHED].sum())
+
+    def expected(self, across: float, rut: float = 0.0) -> float:
+        at = [(self.square * z + self.linear) * z for z in (self.depth, rut)]
+        return float(across * (at[0] - at[1]))
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 30.0, 90.0, 135.0, 200.0, 300.0])
+def test_an_edge_is_met_by_its_width_across_the_motion(angle_deg: float) -> None:
+    a = math.radians(angle_deg)
+    across = 4 * 0.05 * abs(math.cos(a)) + 6 * 0.05 * abs(math.sin(a))
+    footprint = Footprint()
+    assert footprint.pushed(2.0 * math.cos(a), 2.0 * math.sin(a)) == pytest.approx(footprint.expected(across))
+    # what has stopped keeps the side that it ploughed to
+    assert footprint.pushed(0.0, 1e-4) == pytest.approx(footprint.expected(across))
+
+
+def test_a_rut_ahead_is_met_by_what_is_below_it() -> None:
+    """Rut of 60 mm: from 80 mm a line of unloading of 20 mm leads there."""
+    footprint = Footprint()
+    for k in range(4):
+        slot = len(footprint.cells) + k
+        footprint.put(slot, 36, 40 + k, IDLE)
+        m = footprint.t.memory[slot]
+        m[LINE_Z], m[LINE_F], m[LINE_K] = 0.08, 2000.0, 1e5
+    assert footprint.pushed(1.5, 0.0) == pytest.approx(footprint.expected(4 * 0.05, rut=0.06))
+    assert footprint.pushed(-1.5, 0.0) == pytest.approx(footprint.expected(4 * 0.05))
 
 
 def ploughing(velocity: tuple[float, float], friction: Coulomb | JanosiHanamoto, integrator: str = "compiled") -> Run:
