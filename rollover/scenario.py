@@ -71,12 +71,13 @@ class Ground:
 
     def validate(self) -> None:
         """Refuse soil that is pushed aside where the ground keeps no rut to tell what is ahead from what is behind."""
-        for name, place in (("", self), *((f"patches.{i}.", p) for i, p in enumerate(self.patches))):
-            friction = place.friction or self.friction
-            if friction.bulldozing is not None and place.law.memoryless:
+        places = [("", self.friction, self.law)]
+        places += [(f"patches.{i}.", p.friction or self.friction, p.law) for i, p in enumerate(self.patches)]
+        for name, friction, law in places:
+            if friction.bulldozing is not None and law.memoryless:
                 raise ValueError(
-                    f"{name}friction.bulldozing: ground that keeps no rut, got law.kind {place.law.kind!r}; a soil "
-                    "that sinks in, such as 'bekker-wong' or 'ye-2006', or no bulldozing"
+                    f"{name}friction.bulldozing: ground that keeps no rut, got law.kind {law.kind!r}; a soil that "
+                    "sinks in, such as 'bekker-wong' or 'ye-2006', or no bulldozing"
                 )
 
     @property

@@ -38,7 +38,7 @@ def sunk(t: Any, x: int, y: int) -> float:
     if slot < 0:
         return 0.0
     m = t.memory[slot]
-    return max(m[SINKAGE], 0.0) if t.state[slot, MODE] != IDLE else rut_depth(m)  # type: ignore[no-any-return]
+    return max(m[SINKAGE], 0.0) if t.state[slot, MODE] != IDLE else rut_depth(m)
 
 
 @leaf
