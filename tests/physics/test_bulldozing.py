@@ -20,7 +20,7 @@ from rollover.dynamics.simulate import run
 from rollover.kernels.forces import read_poses
 from rollover.kernels.ploughing import plough
 from rollover.kernels.tables import ACTIVE, SLOTS, handle
-from rollover.scenario import Scenario, load
+from rollover.scenario import Scenario, Simulation, load
 from rollover.spec.document import to_mapping
 from rollover.spec.inertia import MassProperties
 from rollover.spec.initiation import Throw
@@ -30,7 +30,8 @@ from rollover.system.errors import InputError
 
 SOIL = BekkerWong(cohesive_modulus=0.0, frictional_modulus=2.0e5, exponent=1.0, width=0.1)
 EARTH = Bulldozing(unit_weight=18_000.0, friction_angle_deg=30.0, cohesion=5000.0, surcharge=1000.0)
-LENGTH, WIDTH, MASS = 0.8, 0.4, 600.0
+# m, kg; edges 0.1 mm within those of elements of 0.1 m, so that sliding straight on never takes in a further row
+LENGTH, WIDTH, MASS = 0.7998, 0.3998, 600.0
 
 
 def test_passive_pressure_by_hand() -> None:
@@ -110,56 +111,48 @@ def ploughing(velocity: tuple[float, float], friction: Coulomb | JanosiHanamoto,
             # its centre of mass at the depth of its sole's pressure: it does not pitch
             whole=MassProperties(mass=MASS, centre_of_mass=(0.0, 0.0, 0.0), inertia=(1e5, 1e5, 1e5)),
             outline=(Box(name="plate", low=(-LENGTH / 2, -WIDTH / 2, 0.0), high=(LENGTH / 2, WIDTH / 2, 0.5)),),
-            contact_spacing=0.02,
+            contact_spacing=0.08,
         ),
         initiation=start,
     )
     ground = replace(
         scenario.ground,
-        elements=Elements(length=6.0, width=6.0, spacing=(0.05, 0.05)),
+        elements=Elements(length=6.0, width=6.0, spacing=(0.1, 0.1)),
         law=SOIL,
         friction=friction,
         co_moving_mass=replace(scenario.ground.co_moving_mass, fraction=0.0),
     )
-    simulation = replace(scenario.simulation, duration=0.4, integrator=integrator)  # type: ignore[arg-type]
+    simulation = Simulation(duration=0.25, step=1e-3, output_step=1e-3, integrator=integrator)  # type: ignore[arg-type]
     done = run(replace(scenario, ground=ground, simulation=simulation))
     assert done.status == "done", done.sentence
     assert float(done.recording["ground/sinkage"].max()) > sunk
     return done
 
 
-def expected(run: Run, across: float) -> np.ndarray:
-    square, linear = EARTH.coefficients
-    z = run.recording["ground/sinkage"]
-    return np.asarray(across * (square * z + linear) * z)
-
-
 @pytest.mark.parametrize(
-    ("velocity", "across"),
+    ("velocity", "across", "most"),
     [
-        ((3.0, 0.0), WIDTH),
-        ((0.0, 3.0), LENGTH),
-        ((-3.0, 0.0), WIDTH),
-        ((2.0, 2.0), (LENGTH + WIDTH) / math.sqrt(2.0)),
+        ((3.0, 0.0), WIDTH, WIDTH),
+        ((0.0, 3.0), LENGTH, LENGTH),
+        ((-3.0, 0.0), WIDTH, WIDTH),
+        # the plate's edges lie within elements, which count in whole: one more of 0.1 m each way
+        ((2.0, 2.0), (LENGTH + WIDTH) / math.sqrt(2.0), (LENGTH + WIDTH + 0.2) / math.sqrt(2.0)),
     ],
 )
-def test_a_plate_that_ploughs_meets_the_closed_form(velocity: tuple[float, float], across: float) -> None:
-    """F = b (1/2 gamma z^2 K_p + q z K_p + 2 c z sqrt(K_p)) at each sinkage, b across the motion; friction aside.
-
-    The plate's edge lies between those of elements most of the time, and takes in the row it has begun with: b by at
-    most one element of 0.05 m too large on either side.
-    """
+def test_a_plate_that_ploughs_meets_the_closed_form(velocity: tuple[float, float], across: float, most: float) -> None:
+    """F = b (1/2 gamma z^2 K_p + q z K_p + 2 c z sqrt(K_p)), b across the motion, z that of the step's start."""
     done = ploughing(velocity, Coulomb(coefficient=0.0, bulldozing=EARTH))
-    force, sunk = done.recording["ground/force_tangential"], done.recording["ground/sinkage"]
-    # well in, and not lifting off
-    deep = (sunk > 0.05) & (done.recording["ground/force_normal"] > 0.2 * MASS * 9.81)
-    assert deep.sum() > 50
-    ratio = force[deep] / expected(done, across)[deep]
-    assert np.median(ratio) == pytest.approx(1.0, abs=0.13)
-    assert ratio.min() > 0.9
+    force, sunk = done.recording["ground/force_tangential"][1:], done.recording["ground/sinkage"][:-1]
+    deep = sunk > 0.02
+    assert deep.sum() > 100
+    square, linear = EARTH.coefficients
+    each = force[deep] / ((square * sunk[deep] + linear) * sunk[deep])
+    assert each.min() > across * (1.0 - 1e-3)
+    assert each.max() < most * (1.0 + 1e-3)
     # it acts against the motion
-    speed = np.hypot(done.recording["chassis/velocity_x"], done.recording["chassis/velocity_y"])
-    assert speed[-1] < 0.9 * math.hypot(*velocity)
+    x, y = (done.recording[f"chassis/velocity_{axis}"] for axis in "xy")
+    assert math.hypot(x[-1], y[-1]) < math.hypot(*velocity)
+    assert x[-1] * velocity[1] == pytest.approx(y[-1] * velocity[0], abs=0.02)
 
 
 @pytest.mark.parametrize("integrator", ["exudyn", "compiled"])
@@ -175,8 +168,8 @@ def test_what_it_takes_is_booked(friction: Coulomb | JanosiHanamoto, integrator:
     plain = ploughing((3.0, 0.0), replace(friction, bulldozing=None), integrator)
     assert closure(done).largest < 0.005
     lost = [0.5 * MASS * (9.0 - r.recording["chassis/velocity_x"][-1] ** 2) for r in (done, plain)]
-    assert lost[0] > 1.3 * lost[1]
-    # 0.2 of the weight and more bears all the time: what is lost along x is what friction took
+    assert lost[0] > 1.1 * lost[1]
+    # the plate keeps level: what is lost along x is what friction took
     assert done.ledger["friction"] == pytest.approx(lost[0], rel=0.02)
 
 
