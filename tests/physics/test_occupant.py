@@ -18,7 +18,7 @@ from rollover.dynamics.setup import set_up
 from rollover.kernels import occupant as k
 from rollover.kernels.forces import read_poses
 from rollover.kernels.generalised_alpha import turn
-from rollover.kernels.tables import Tables, handle
+from rollover.kernels.tables import OCCUPANT, Tables, handle
 from rollover.scenario import Ground, Scenario, Simulation, load
 from rollover.spec.document import to_mapping
 from rollover.spec.inertia import MassProperties
@@ -132,6 +132,41 @@ def test_a_stop_adds_to_the_spring_beyond_its_angle() -> None:
         moment = t.link_memory[t.link_i[:, 0] == k.JOINT, k.L_MOMENT : k.L_MOMENT + 3][0]
         assert moment[axis] == pytest.approx(-expected, rel=1e-5)
         assert np.abs(np.delete(moment, axis)).max() < 1e-6
+
+
+def test_newtons_matrix_is_the_slope_of_the_forces() -> None:
+    """Joints at rest, and straps and hips a little strained: K = -dQ/dq but for the turning of what is loaded already.
+
+    Those terms are the loads over the lengths that they act on, here 1 N over 0.1 m of 1e4 N/m and more.
+    """
+    occupant = Occupant(seat=SEAT, belt=LapBelt(slack=0.0))
+    bodies, t, q = laid_out(tower(occupant, gravity=0.0))
+    pelvis = 6 * [b.name for b in bodies].index("occupant_pelvis")
+    q[pelvis : pelvis + 3] += [3e-5, 2e-6, -1e-5]
+    _, Q = tried(t, q)
+    K, slope, chance = np.zeros((q.size, q.size)), np.zeros((q.size, q.size)), 1e-7
+    k.stiffen_links(handle(t), 1.0, 0.0, K)
+    for i in range(q.size):
+        nudged = q.copy()
+        nudged[i] += chance
+        slope[:, i] = -(tried(t, nudged)[1] - Q) / chance
+    assert {k.JOINT, k.STRAP, k.BLOCK} == set(t.link_i[t.link_memory[:, k.HELD_NOW] > 0.0, 0].tolist())
+    assert np.abs(K - slope).max() < 1e-4 * np.abs(K).max()
+
+
+def test_what_is_held_is_booked_once() -> None:
+    """Two steps: the ledger has what is held at their end, the recording the straps' forces there."""
+    bodies, t, q = laid_out(tower(Occupant(seat=SEAT, belt=LapBelt(slack=0.0)), gravity=0.0))
+    pelvis = 6 * [b.name for b in bodies].index("occupant_pelvis")
+    for rise in (0.02, 0.03):
+        lifted = q.copy()
+        lifted[pelvis + 2] += rise
+        held, _ = tried(t, lifted)
+        k.finish_links(handle(t), 1e-3)
+        assert t.work[OCCUPANT] == pytest.approx(held, rel=1e-12)
+    straps = t.link_memory[t.link_i[:, 0] == k.STRAP, k.L_FORCE]
+    assert t.link_out[9:11] == pytest.approx(straps, rel=1e-12)
+    assert straps.min() > 1000.0
 
 
 def modes(occupant: Occupant) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
