@@ -46,11 +46,11 @@ def tower(occupant: Occupant, *, gravity: float = 9.81, roll_deg: float = 0.0, d
                 inertia=(mass * (b * b + c * c) / 12, mass * (a * a + c * c) / 12, mass * (a * a + b * b) / 12),
             ),
             outline=(Box(name="block", low=(-2.0, -1.0, 0.0), high=(2.0, 1.0, 4.0)),),
-            contact_spacing=0.1,
+            contact_spacing=0.4,
             occupant=occupant,
         ),
-        ground=Ground(elements=Elements(length=12.0, width=8.0, spacing=(0.2, 0.2)), law=Hard(stiffness=1e7)),
-        initiation=Release(height=1.0) if gravity == 0.0 else Drop(speed=0.0, roll_deg=roll_deg),
+        ground=Ground(elements=Elements(length=12.0, width=8.0, spacing=(0.5, 0.5)), law=Hard(stiffness=1e7)),
+        initiation=Release(height=1.0) if gravity == 0.0 else Drop(speed=1e-6, roll_deg=roll_deg),
         simulation=Simulation(duration=duration, step=1e-3, output_step=1e-3),
         gravity=gravity,
     )
@@ -230,15 +230,15 @@ def sat() -> simulate.Run:
 
 
 def test_who_sits_is_carried_by_the_cushion(sat: simulate.Run) -> None:
-    """m g on the pelvis from the start; what lies above each joint through it; nothing of the belt."""
-    end = {name: values[-1] for name, values in sat.recording.channels.items()}
-    weight = 75.0 * 9.81
+    """m g on the pelvis from the start, over two swings of the cushion; what is above each joint through it."""
+    weight, late = 75.0 * 9.81, sat.recording.time > 1.0 - 2.0 * 2.0 * math.pi * math.sqrt(75.0 / 4.0e4)
+    mean = {name: float(values[late].mean()) for name, values in sat.recording.channels.items()}
     assert sat.recording["occupant/pelvis/contact_force"][0] == pytest.approx(weight, rel=1e-6)
-    assert end["occupant/pelvis/contact_force"] == pytest.approx(weight, rel=5e-3)
-    assert end["occupant/lumbar/force"] == pytest.approx((SHARES[1] + SHARES[2]) * weight, rel=5e-3)
-    assert end["occupant/neck/force"] == pytest.approx(SHARES[2] * weight, rel=5e-3)
-    assert end["occupant/belt/left/force"] == end["occupant/belt/right/force"] == 0.0
-    assert abs(end["occupant/head/acceleration_z"]) < 0.05
+    assert mean["occupant/pelvis/contact_force"] == pytest.approx(weight, rel=5e-3)
+    assert mean["occupant/lumbar/force"] == pytest.approx((SHARES[1] + SHARES[2]) * weight, rel=5e-3)
+    assert mean["occupant/neck/force"] == pytest.approx(SHARES[2] * weight, rel=5e-3)
+    assert mean["occupant/belt/left/force"] == mean["occupant/belt/right/force"] == 0.0
+    assert abs(mean["occupant/head/acceleration_z"]) < 0.05
 
 
 def hung(belt: LapBelt | None) -> simulate.Run:
