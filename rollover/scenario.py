@@ -75,8 +75,9 @@ class Ground:
         places += [(f"patches.{i}.", p.friction or self.friction, p.law) for i, p in enumerate(self.patches)]
         for name, friction, law in places:
             if friction.bulldozing is not None and law.memoryless:
+                kind = getattr(law, "kind", "")  # of one's own laws too
                 raise ValueError(
-                    f"{name}friction.bulldozing: ground that keeps no rut, got law.kind {law.kind!r}; a soil that "
+                    f"{name}friction.bulldozing: ground that keeps no rut, got law.kind {kind!r}; a soil that "
                     "sinks in, such as 'bekker-wong' or 'ye-2006', or no bulldozing"
                 )
 
