@@ -271,7 +271,7 @@ def test_the_ledger_closes_with_an_occupant(belt: object) -> None:
     assert done.status == "done", done.sentence
     assert closure(done).largest < 0.005
     assert done.ledger["occupant"] > 50.0
-    assert done.recording["occupant/head/acceleration_y"].max() > 9.81
+    assert np.abs(done.recording["occupant/head/acceleration_y"]).max() > 9.81  # thrown harder than it weighs
 
 
 # ---------------------------------------------------------------- in files
