@@ -31,6 +31,7 @@ SITE = {  # caption -> pages, in the order of the menu
         "docs/engineers_day",
         "docs/rops_from_sections",
         "docs/inputs",
+        "docs/occupant",
         "docs/viewing",
         "docs/commands",
         "docs/python",

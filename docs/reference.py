@@ -23,12 +23,14 @@ from rollover.spec.document.slot import Slot, slots
 from rollover.spec.rops import Rops
 from rollover.spec.standards.codes import STANDARDS, Tractor
 from rollover.spec.standards.iso_3471 import MACHINES, iso_3471_requirements
+from rollover.spec.standards.machine_codes import SCOPES
 from rollover.spec.steel import Steel
 from rollover.studies.study import Study
 
 EXAMPLE = Tractor(
     mass=3000.0, wheelbase=2.25, rear_share=0.6, pitch_inertia=5493.0, width=1.9, rops_width=1.1, folding=False
 )
+MACHINE = Tractor(mass=10_000.0)
 ROOTS: dict[str, tuple[str, str, Sequence[type]]] = {  # page -> its title, what it is, the classes that it begins with
     "scenario": ("Keys of a scenario", "A scenario file, and what stands below it.", [scenarios.Scenario]),
     "vehicle": (
@@ -210,7 +212,7 @@ def standards() -> str:
     }
     text = ["# Standards\n", "This is a simulation study, not type approval. " + _example() + "\n"]
     machines = {f"ISO 3471, {name}": iso_3471_requirements(name, 10000.0) for name in MACHINES}
-    of = {name: rule(EXAMPLE) for name, rule in STANDARDS.items()}
+    of = {name: rule(MACHINE if name in SCOPES else EXAMPLE) for name, rule in STANDARDS.items()}
     for name, asked in {**of, **machines}.items():
         rows = [
             (
@@ -230,7 +232,7 @@ def standards() -> str:
 def _example() -> str:
     return (
         f"Values are those of a tractor of {EXAMPLE.mass:g} kg with a wheelbase of {EXAMPLE.wheelbase:g} m, "
-        "for ISO 3471 of a machine of 10,000 kg."
+        "for ISO 3471 and the codes of other machines of one of 10,000 kg."
     )
 
 

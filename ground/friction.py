@@ -17,7 +17,35 @@ import math
 from typing import Annotated, Literal
 
 from ground.kinds import ByKind
-from ground.quantity import Quantity, parameters
+from ground.quantity import Later, Quantity, parameters
+
+
+@parameters
+class Bulldozing:
+    """Passive earth pressure on what ploughs sideways, F = b (1/2 gamma z^2 K_p + q z K_p + 2 c z sqrt(K_p)).
+
+    Rankine (1857) with the cohesion term of Bell (1915): a smooth upright wall of width b in level soil to the depth z,
+    K_p = tan^2(45 deg + phi/2). Recalled; the formulae stand in every textbook of soil mechanics.
+    """
+
+    unit_weight: Annotated[float, Quantity("N/m3", "gamma, of the soil", above=0)]
+    friction_angle_deg: Annotated[float, Quantity("deg", "phi, angle of internal friction", least=0, below=60)]
+    cohesion: Annotated[float, Quantity("Pa", "c", least=0)] = 0.0
+    surcharge: Annotated[float, Quantity("Pa", "q, of what lies on the soil ahead: a bow wave", least=0)] = 0.0
+
+    @property
+    def passive(self) -> float:
+        """K_p."""
+        return math.tan(math.radians(45.0 + 0.5 * self.friction_angle_deg)) ** 2
+
+    @property
+    def coefficients(self) -> tuple[float, float]:
+        """A (N/m3) and B (N/m2) of F/b = A z^2 + B z."""
+        k = self.passive
+        return 0.5 * self.unit_weight * k, self.surcharge * k + 2.0 * self.cohesion * math.sqrt(k)
+
+
+Ploughs = Annotated[Bulldozing | None, Later(), "what ploughs meets the soil ahead of it; null: it does not"]
 
 
 @parameters
@@ -31,6 +59,7 @@ class Coulomb:
     coefficient: Annotated[float, Quantity("1", "mu", least=0, most=2)] = 0.0
     stick_displacement: Annotated[float, Quantity("m", "shear displacement d_s at which it slips", above=0)] = 0.002
     stick_relaxation: Annotated[float, Quantity("s", "dashpot over spring while it sticks", least=0)] = 0.005
+    bulldozing: Ploughs = None
 
 
 @parameters
@@ -41,6 +70,7 @@ class JanosiHanamoto:
     cohesion: Annotated[float, Quantity("Pa", "c", least=0)]
     friction_angle_deg: Annotated[float, Quantity("deg", "phi, angle of internal friction", least=0, below=60)]
     shear_modulus: Annotated[float, Quantity("m", "K, shear displacement at 63 % of the strength", above=0)]
+    bulldozing: Ploughs = None
 
     @property
     def coefficient(self) -> float:

@@ -35,7 +35,8 @@ TOUCH_SPEED = 24  # latched normal impact speed, m/s
 SPREAD = 25  # how far the mean of the covered area stands above its deepest point, m
 GROWING = 26  # 1 while the co-moving mass may still grow with depth
 SHEARED = 27  # shear displacement j since the touch, of ground that shears, m
-COLUMNS = 28
+PLOUGHED = 28  # passive earth pressure that it takes to push the soil ahead aside, N; frozen for a step
+COLUMNS = 29
 
 # columns of state (int)
 # which element, body above it, mode, domain flags, touches so far, row of its law and friction

@@ -24,6 +24,7 @@ from rollover.spec.initiation import Driving, Drop, Initiation, Release, Standin
 from rollover.spec.laws import laws
 from rollover.spec.rops import Rops
 from rollover.spec.stand import PendulumBlow, StaticTest, TiltTable
+from rollover.spec.standards.machine_codes import outside
 from rollover.spec.standards.static_sequence import sequence
 from rollover.spec.steel import Steel
 from rollover.spec.vehicle import RigidBody, Striker, Vehicle
@@ -67,6 +68,18 @@ class Ground:
         "or the latter with m v clamped to the calibrated momentum",
     ] = "reference"
     patches: Annotated[tuple[Patch, ...], "parts with another soil; the last one counts where they overlap"] = ()
+
+    def validate(self) -> None:
+        """Refuse soil that is pushed aside where the ground keeps no rut to tell what is ahead from what is behind."""
+        places = [("", self.friction, self.law)]
+        places += [(f"patches.{i}.", p.friction or self.friction, p.law) for i, p in enumerate(self.patches)]
+        for name, friction, law in places:
+            if friction.bulldozing is not None and law.memoryless:
+                kind = getattr(law, "kind", "")  # of one's own laws too
+                raise ValueError(
+                    f"{name}friction.bulldozing: ground that keeps no rut, got law.kind {kind!r}; a soil that "
+                    "sinks in, such as 'bekker-wong' or 'ye-2006', or no bulldozing"
+                )
 
     @property
     def every_law(self) -> list[GroundLaw]:
@@ -112,13 +125,18 @@ class Simulation:
             raise ValueError(f"duration: less than output_step ({self.output_step!r} s), got {self.duration!r}; longer")
 
 
+Standard = Literal[
+    "code-3", "code-4", "code-6", "code-7", "sae-j1194", "sae-j2194", "code-8", "iso-8082-1", "iso-12117-2"
+]
+
+
 @parameters
 class Loads:
     """How loads are reported."""
 
     cfc: Annotated[Literal[60, 180, 600, 1000], "filter class of the filtered peaks, SAE J211"] = 60
     standards: Annotated[
-        tuple[Literal["code-3", "code-4", "code-6", "code-7", "sae-j1194", "sae-j2194"], ...] | None,
+        tuple[Standard, ...] | None,
         "whose requirements the run is held against; null: the OECD code that applies to the vehicle",
     ] = None
 
@@ -164,6 +182,9 @@ class Scenario:
                 f"excitation: drives a striker only, got a vehicle of kind {self.vehicle.kind!r}; 'striker' is allowed"
             )
         _check_start(self.vehicle, self.initiation)
+        for i, code in enumerate(self.loads.standards or ()):
+            if isinstance(self.vehicle, Vehicle) and (fault := outside(code, self.vehicle.whole.mass)):
+                raise ValueError(f"loads.standards.{i}: {fault}")
         check_inputs(self.inputs, self.vehicle, self.initiation)
         if self.simulation.integrator == "compiled" and (fault := _beyond_loop(self.initiation, self.excitation)):
             raise ValueError(f"simulation.integrator: 'compiled' {fault}; 'exudyn' is allowed")

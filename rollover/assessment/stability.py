@@ -29,7 +29,7 @@ from rollover.kernels.tables import A_IMPACT, A_SWING, E_FORCE_NOW, E_SHEAR, W_M
 from rollover.scenario import Scenario
 from rollover.spec.inertia import combined
 from rollover.spec.initiation import Standing
-from rollover.spec.vehicle import Attached, Vehicle
+from rollover.spec.vehicle import Attached, Vehicle, seated_still
 from rollover.system.errors import Fault, InputError
 
 Array = NDArray[np.float64]
@@ -109,6 +109,7 @@ def stability_angles(
 
 def _still(scenario: Scenario, vehicle: Vehicle) -> Scenario:
     """The vehicle alone on a plane: ROPS and all that it carries fixed to the chassis, no outlines, no effects."""
+    vehicle = seated_still(vehicle)
     attached = tuple(replace(a, outline=()) for a in _on_chassis(vehicle.attached))
     alone = replace(vehicle, rops=None, attached=attached, outline=())
     ground = replace(scenario.ground, surface=Plane(), patches=())
@@ -334,11 +335,14 @@ def losses(scenario: Scenario) -> tuple[Loss, ...]:
         )
         mass = sum(p.mass for p in parts)
         found.append(Loss(part="ROPS", mass=mass, without=side(bare), beside=given))
+    if (occupant := vehicle.occupant) is not None:
+        empty = replace(vehicle, occupant=None)
+        found.append(Loss(part="occupant", mass=occupant.mass, without=side(empty), beside=given))
     for a in vehicle.attached:
         rest = replace(vehicle, attached=tuple(b for b in vehicle.attached if b is not a))
         found.append(Loss(part=a.name, mass=a.mass, without=side(rest), beside=given))
     zone = vehicle.rops.clearance_zone if vehicle.rops is not None else None
-    if zone is not None and all("driver" not in a.name for a in vehicle.attached):
+    if zone is not None and vehicle.occupant is None and all("driver" not in a.name for a in vehicle.attached):
         x, y, z = zone.seat_reference_point
         driver = Attached(name="driver", mass=DRIVER, centre_of_mass=(x, y, z + SEATED), size=(0.4, 0.4, 0.9))
         manned = side(replace(vehicle, attached=(*vehicle.attached, driver)))

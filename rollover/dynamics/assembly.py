@@ -16,10 +16,11 @@ from ground.settings import settings
 from ground.surface import is_flat, normal
 from ground.surface import tables as surface_tables
 from rollover.dynamics.bodies import Body, bodies_of, nose_share
+from rollover.dynamics.occupant import link_rows
 from rollover.dynamics.rows import joint_rows, mount_rows, term_rows, turning_rows, upright, wheel_rows
 from rollover.effects import acting
+from rollover.kernels import occupant, terms
 from rollover.kernels import tables as c
-from rollover.kernels import terms
 from rollover.kernels.applied_forces import ACCOUNTS, HISTORY, coefficients
 from rollover.kernels.tables import Tables
 from rollover.kernels.wheel_spin import spin_mass
@@ -56,6 +57,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     mount_f, mount_i = mount_rows(vehicle, bodies, row)
     joint_i, joint_f, axle_f, axle_i = joint_rows(vehicle, bodies, row)
     term_i, term_f = term_rows(scenario, bodies)
+    link_i, link_f, link_out = link_rows(scenario, bodies, row)
     n = normal(ground.surface) if is_flat(ground.surface) else np.array([0.0, 0.0, 1.0])
     relief, nodes = surface_tables(ground.surface, ground.elements.spacing)
     nx, ny = ground.elements.count
@@ -158,6 +160,10 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         input_memory=np.zeros((0, 0)),
         input_q=np.zeros((0, 6 * nb)),
         pieces=np.zeros((0, 0)),
+        link_i=link_i,
+        link_f=link_f,
+        link_memory=np.zeros((len(link_i), occupant.LINK_MEMORY)),
+        link_out=link_out,
     )
 
 
@@ -212,6 +218,7 @@ def _soil(ground: Ground, law: GroundLaw, place: Ground | Patch, share: float, i
     rule = {"reference": c.RULE_REFERENCE, "effective": c.RULE_EFFECTIVE, "clamped": c.RULE_CLAMPED}
     friction = place.friction or ground.friction
     sticks, shears = (0.0, 0.0), (0.0, 0.0)
+    ploughs = (0.0, 0.0) if friction.bulldozing is None else friction.bulldozing.coefficients
     if isinstance(friction, Coulomb):
         sticks = friction.stick_displacement, friction.stick_relaxation
     else:
@@ -225,6 +232,7 @@ def _soil(ground: Ground, law: GroundLaw, place: Ground | Patch, share: float, i
         law.domain.momentum_most,
         float(is_free),
         *shears,
+        *ploughs,
     ]
 
 

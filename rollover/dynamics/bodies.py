@@ -100,6 +100,11 @@ def bodies_of(
                 inertia = carried(vehicle, "rops")
             extra = loads("rops") if name == "rops" else []
             found.append(Body(name=name, inertia=inertia, surfaces=tuple(sampled(members) + extra)))
+    if isinstance(vehicle, Vehicle) and vehicle.occupant is not None:
+        outlines = vehicle.occupant.outlines
+        for name, inertia in vehicle.occupant.parts.items():
+            surfaces = tuple(sampled((outlines[name],)))
+            found.append(Body(name=f"occupant_{name}", inertia=inertia, surfaces=surfaces))
     for name in loose(effects):
         load = loose_body(effects, name, found[0].inertia)
         rest = without(found[0].inertia, load)

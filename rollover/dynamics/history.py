@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.kernel import CELL, LINE_Z, ROW, SINKAGE
+from rollover.dynamics import occupant
 from rollover.dynamics.bodies import Body
 from rollover.dynamics.prescribed import ground_acceleration, quantity, steered_kinetic
 from rollover.inputs import Shake
@@ -17,7 +18,7 @@ from rollover.kernels.time_loop import ROWS, Watch
 from rollover.scenario import Scenario
 from rollover.spec.frames import angles, matrices, quaternions
 from rollover.spec.rops import Rops
-from rollover.spec.vehicle import Striker
+from rollover.spec.vehicle import Striker, Vehicle
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ def row_length(t: Tables) -> int:
     n = len(t.spin_mass)
     out = OUT_COLUMNS if len(t.device_i) else 0
     parts = len(t.pose) * RESULTANT_COLUMNS + 10 * len(t.wheel_i) + 12 * len(t.mount_f)
-    return int(3 * n + parts + 2 + WORKS + 1 + 3 + len(t.input_i) + out)
+    return int(3 * n + parts + 2 + WORKS + 1 + 3 + len(t.input_i) + len(t.link_out) + out)
 
 
 @dataclass
@@ -86,6 +87,7 @@ class States:
     flags: NDArray[np.int64]
     footprint: Array
     prescribed: Array  # (n, ni) what the inputs were
+    links: Array  # (n, no) of an occupant, see rollover.dynamics.occupant
     device: Array  # (n, OUT_COLUMNS), or (n, 0) without a test stand
 
 
@@ -117,6 +119,7 @@ def states(rows: Array, t: Tables) -> States:
         flags=take().astype(np.int64),
         footprint=take(),
         prescribed=take(len(t.input_i)),
+        links=take(len(t.link_out)),
         device=rows[:, at:],
     )
 
@@ -153,6 +156,8 @@ def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> 
     if len(t.device_i):
         ledger["device"] = s.work[:, c.DEVICE]
         ledger["lashing"] = s.work[:, c.LASHING]
+    if len(t.link_i):
+        ledger["occupant"] = s.work[:, c.OCCUPANT]
     if len(t.input_i):
         ledger["input"] = s.work[:, c.INPUT]
     total = np.sum(list(ledger.values()), axis=0)
@@ -198,6 +203,8 @@ def channels(scenario: Scenario, time: Array, s: States, t: Tables, bodies: tupl
             found["axle/front/angle"] = s.axle[:, 0]
             if vehicle.front_axle.stop == "impact":
                 found["axle/front/impulse"] = s.axle[:, 1]
+    if isinstance(vehicle, Vehicle) and vehicle.occupant is not None:
+        found |= occupant.channels(vehicle.occupant, s.links, s.q, s.qdd, s.resultant, row)
     for k, one in enumerate(scenario.inputs):
         found[f"input/{one.name}/{quantity(one)}"] = s.prescribed[:, k]
     for k, name in enumerate(("force", "deflection", "energy") if s.device.size else ()):

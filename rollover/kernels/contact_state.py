@@ -25,6 +25,7 @@ from ground.kernel import (
     OWNER_R,
     PLACE,
     PLASTIC,
+    PLOUGHED,
     REST_STIFFNESS,
     ROW,
     SHEAR,
@@ -205,7 +206,7 @@ def latch(t: Any, slot: int, b: int, speed: float, swept: float, z: float) -> No
     for k in range(3):
         m[OWNER_R + k] = r[k]
         m[SHEAR + k] = 0.0
-    m[SHEARED] = 0.0
+    m[SHEARED] = m[PLOUGHED] = 0.0
     state[BODY] = b
     acceleration = depth_acceleration(t.pose[b], r, n)
     start = max(z - swept, rut_depth(m))

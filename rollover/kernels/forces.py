@@ -19,6 +19,7 @@ from ground.kernel import (
     OFFSET,
     OWNER_R,
     PLACE,
+    PLOUGHED,
     ROW,
     SHEAR,
     SHEARED,
@@ -29,6 +30,7 @@ from ground.kernel import (
 from ground.shear import shear_force
 from rollover.kernels.compliant_joints import try_mounts
 from rollover.kernels.inputs import read_inputs, try_inputs
+from rollover.kernels.occupant import try_links
 from rollover.kernels.stand_devices import try_devices
 from rollover.kernels.tables import (
     A_C,
@@ -136,10 +138,11 @@ def try_elements(t: Any, Q: Any) -> None:
         trial[MOVED], trial[MOVED + 1], trial[MOVED + 2] = x - m[PLACE], y - m[PLACE + 1], z - m[PLACE + 2]
         modulus = t.soil[law, MODULUS]
         if modulus > 0.0:
-            strength = t.soil[law, COHESION] * m[AREA] + mu * force if force > 0.0 else 0.0
+            strength = t.soil[law, COHESION] * m[AREA] + mu * force + m[PLOUGHED] if force > 0.0 else 0.0
             f = shear_force(strength, modulus, m[SHEARED], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], n)
         else:
-            f = friction_force(mu, stick, relaxation, force, m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], v, n)
+            most = mu * force + m[PLOUGHED] if force > 0.0 else 0.0
+            f = friction_force(1.0, stick, relaxation, most, m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], v, n)
         trial[FT], trial[FT + 1], trial[FT + 2] = f
         if m[MASS_B] > 0.0:
             # the co-moving mass is in the mass matrix; what its centripetal acceleration takes stands here
@@ -337,6 +340,7 @@ def generalised_forces(t: Any, q: Any, qd: Any, Q: Any) -> None:
     try_axle(t, Q)
     try_devices(t, Q)
     try_terms(t, Q)
+    try_links(t, Q)
     try_inputs(t, Q)
 
 

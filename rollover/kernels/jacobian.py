@@ -21,6 +21,7 @@ from ground.kernel import (
     NORMAL,
     OWNER_R,
     PLASTIC,
+    PLOUGHED,
     ROW,
     SHEAR,
     SPREAD,
@@ -28,6 +29,7 @@ from ground.kernel import (
 )
 from ground.law import REFERENCE_AREA
 from rollover.kernels.forces import TYRE_RELAXATION, tyre_stiffness
+from rollover.kernels.occupant import stiffen_links
 from rollover.kernels.tables import (
     A_C,
     A_K,
@@ -160,9 +162,9 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
             add_tangent(K, t.pose[b], b, m, trial, soil, normal, f + fd * soil[RELAXATION])
             continue
         if soil[MODULUS] > 0.0:
-            stick = (soil[COHESION] * m[AREA] + soil[MU] * trial[FN]) / soil[MODULUS]
+            stick = (soil[COHESION] * m[AREA] + soil[MU] * trial[FN] + m[PLOUGHED]) / soil[MODULUS]
         else:
-            stick = soil[MU] * trial[FN] / soil[STICK]
+            stick = (soil[MU] * trial[FN] + m[PLOUGHED]) / soil[STICK]
         add_point(
             K,
             t.pose[b],
@@ -183,6 +185,7 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
             add_point(K, t.pose[b], b, g[E_POINT : E_POINT + 3], g[E_NORMAL_NOW : E_NORMAL_NOW + 3], normal, stick)
     add_mounts(t, f, fd, K)
     stiffen_terms(t, f, fd, K)
+    stiffen_links(t, f, fd, K)
     if t.axle_f.size > 0 and t.axle_memory[M_TORQUE_NOW] != 0.0:
         c, b = t.axle_i[0], t.axle_i[1]
         add_pair(K, f * t.axle_f[A_K] + fd * t.axle_f[A_C], spin_row(t, c, c, 0), 6 * c, spin_row(t, c, b, 0), 6 * b)

@@ -74,6 +74,9 @@ def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
     for i in range(t.input_i.shape[0]):
         row[k] = t.input_memory[i, V_NOW]
         k += 1
+    for j in range(t.link_out.size):
+        row[k] = t.link_out[j]
+        k += 1
     if t.device_i.shape[0] > 0:
         for j in range(OUT_COLUMNS):
             row[k + j] = t.device_out[j]

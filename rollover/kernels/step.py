@@ -20,6 +20,8 @@ from rollover.kernels.elements import finish_elements, settle
 from rollover.kernels.forces import along_axle, generalised_forces, keep_tyres, read_poses
 from rollover.kernels.impact import strike_stop
 from rollover.kernels.inputs import finish_inputs
+from rollover.kernels.occupant import finish_links
+from rollover.kernels.ploughing import plough
 from rollover.kernels.stand_devices import finish_devices, keep_poses
 from rollover.kernels.steering import steer
 from rollover.kernels.tables import (
@@ -103,6 +105,7 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any, is_tried: b
     finish_devices(t, h, DEVICE)
     finish_inputs(t, h)
     finish_terms(t, h)
+    finish_links(t, h)
     finish_spins(t, h)
     start_step(t)
     before = qd.copy()
@@ -114,6 +117,7 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any, is_tried: b
     t.velocity[:] = qd
     settle(t)
     read_poses(t.pose, q, qd)  # the impact changed the velocities
+    plough(t)
     steer(t, qd)
     keep_poses(t)
 

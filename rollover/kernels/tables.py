@@ -64,7 +64,9 @@ MU, STICK, RELAXATION, FRACTION, MASS_RULE, MASS_GIVEN, MOMENTUM_MOST = 0, 1, 2,
 # 1: the ground remembers nothing and nothing of it moves along: each point of a body is a contact of its own
 MEMORYLESS = 7
 # of soil that shears: c, Pa, and K, m, 0 for Coulomb friction; `MU` is tan(phi)
-COHESION, MODULUS, SOIL_COLUMNS = 8, 9, 10
+COHESION, MODULUS = 8, 9
+# of soil that is pushed aside: A, N/m3, and B, N/m2, of a force for each width F/b = A z^2 + B z; 0: it is not
+PLOUGH_SQUARE, PLOUGH_LINEAR, SOIL_COLUMNS = 10, 11, 12
 RULE_REFERENCE, RULE_EFFECTIVE, RULE_CLAMPED = 0, 1, 2
 
 # places in counts
@@ -72,7 +74,7 @@ SLOTS, ACTIVE, EVENTS, OUTSIDE, FLAGS_NOW, COUNTS = 0, 1, 2, 3, 4, 5
 
 # places in work (J taken from the vehicle since the start)
 SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, DEVICE, LASHING = 0, 1, 2, 3, 4, 5, 6, 7
-EXTRA_WORK, DRIVE, INPUT, WORKS = 8, 9, 10, 11
+EXTRA_WORK, DRIVE, INPUT, OCCUPANT, WORKS = 8, 9, 10, 11, 12
 
 # columns of trial: what the last evaluation found for each active element
 Z, ZDOT, FN, FT, MOVED, TRIAL_COLUMNS = 0, 1, 2, 3, 6, 9
@@ -176,6 +178,11 @@ class Tables(NamedTuple):
     input_memory: Any  # (ni, INPUT_MEMORY)
     input_q: Any  # (2, 6 nb) generalised forces now, then at the start of the step
     pieces: Any  # (np, PIECE_COLUMNS) of all signals
+    # an occupant, see rollover.kernels.occupant; nl links, none without
+    link_i: Any  # (nl, 4) kind, body b, body a, first place in link_out
+    link_f: Any  # (nl, LINK_COLUMNS)
+    link_memory: Any  # (nl, LINK_MEMORY)
+    link_out: Any  # (no,) what is recorded: contact force on each part (world), straps, joints
 
 
 @register
@@ -262,4 +269,8 @@ def handle(t: Any) -> Any:
         t.input_memory,
         t.input_q,
         t.pieces,
+        t.link_i,
+        t.link_f,
+        t.link_memory,
+        t.link_out,
     )

@@ -46,6 +46,7 @@ _ENERGY = {
     "device": "taken by the devices of a test stand, less what they put in",
     "lashing": "stored and lost in the lashings of a test stand",
     "effects": "taken by effects on the bodies: guide, air, a compliant striker",
+    "occupant": "stored and lost in the occupant's joints, belt and contacts with seat, frame and vehicle",
     "drive": "taken by the brakes, less what the engine gave",
     "input": "taken by prescribed forces, motion of the ground and steering, less what they put in",
     "residual": "what the ledger does not explain",
@@ -96,6 +97,14 @@ CHANNELS: dict[str, Channel] = {
         Channel(name="wheel/NAME/spin", unit="rad/s", meaning="of a wheel that turns by itself, forward"),
         Channel(name="axle/front/angle", unit="rad", meaning="of the front axle about its pivot", period=TURN),
         Channel(name="axle/front/impulse", unit="N m s", meaning="of the axle on its stops, accumulated"),
+        *_axes("occupant/NAME/acceleration", "m/s2", "centre of mass of pelvis, torso or head, coordinate, own axes"),
+        Channel(
+            name="occupant/NAME/contact_force", unit="N", meaning="on a part by seat, frame and vehicle, resultant"
+        ),
+        Channel(name="occupant/NAME/ground_force", unit="N", meaning="on a part by the ground, resultant"),
+        Channel(name="occupant/NAME/force", unit="N", meaning="through lumbar or neck, resultant"),
+        Channel(name="occupant/NAME/moment", unit="N m", meaning="through lumbar or neck, resultant"),
+        Channel(name="occupant/belt/NAME/force", unit="N", meaning="tension of a strap of the lap belt"),
         Channel(name="input/NAME/angle", unit="rad", meaning="prescribed: of the front wheels, or of a tilt table"),
         Channel(name="input/NAME/force", unit="N", meaning="prescribed, on a body"),
         Channel(name="input/NAME/torque", unit="N m", meaning="prescribed: of the engine, or limit of a brake"),

@@ -8,10 +8,12 @@ is taken off to find the chassis. Attached masses (ballast, driver, implement) c
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from ground.quantity import Label, Quantity, parameters
+from ground.quantity import Label, Later, Quantity, parameters
 from rollover.spec.inertia import MassProperties, combined, cuboid
+from rollover.spec.occupant import Occupant, check_room
 from rollover.spec.provenance import Provenance
 from rollover.spec.rops import Rops
 from rollover.spec.shapes import Point, Shape
@@ -130,6 +132,7 @@ class Vehicle:
     rops: Rops | None = None
     outline: Annotated[tuple[Shape, ...], "what of the chassis can touch the ground: bonnet, fenders, mass block"] = ()
     attached: Annotated[tuple[Attached, ...], "masses beyond the whole: ballast, implement, driver, tank"] = ()
+    occupant: Annotated[Occupant | None, Later(), "who sits on it, as bodies of its own; null: nobody"] = None
     contact_spacing: Annotated[float, Quantity("m", "of the contact points on outlines and members", above=0)] = 0.03
     provenance: tuple[Provenance, ...] = ()
 
@@ -149,6 +152,8 @@ class Vehicle:
         if len(set(masses)) != len(masses):
             raise ValueError(f"attached: two masses share a name, got {masses}; each name once")
         chassis_of(self)
+        if self.occupant is not None:
+            check_room(self.occupant, self.outline, self.rops)
 
     def on_axle(self, wheel: Wheel, axle: str) -> bool:
         """Whether a wheel belongs to the "front", the "rear" or "all" of the axles."""
@@ -232,7 +237,21 @@ def carried(vehicle: Vehicle | RigidBody, carrier: Carrier) -> MassProperties:
 
 def laden(vehicle: Vehicle | RigidBody) -> MassProperties:
     """Mass properties of the vehicle with everything that is attached to it."""
-    return combined([vehicle.whole, *(a.body for a in vehicle.attached)]) if vehicle.attached else vehicle.whole
+    extra = [a.body for a in vehicle.attached]
+    if isinstance(vehicle, Vehicle) and vehicle.occupant is not None:
+        extra += vehicle.occupant.parts.values()
+    return combined([vehicle.whole, *extra]) if extra else vehicle.whole
+
+
+def seated_still(vehicle: Vehicle) -> Vehicle:
+    """The same vehicle with its occupant as masses fixed to the chassis, which touch nothing."""
+    if vehicle.occupant is None:
+        return vehicle
+    parts = tuple(
+        Attached(name=f"occupant_{name}", mass=body.mass, centre_of_mass=body.centre_of_mass, inertia=body.inertia)
+        for name, body in vehicle.occupant.parts.items()
+    )
+    return replace(vehicle, attached=(*vehicle.attached, *parts), occupant=None)
 
 
 def pitch_inertia(vehicle: Vehicle) -> tuple[float, float] | None:

@@ -42,6 +42,7 @@ RUN = [
     ),
     "docs/commands.md",
     "docs/inputs.md",
+    "docs/occupant.md",
     "docs/own_law.md",
     "docs/viewing.md",
     "docs/python.md",

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from rollover.scenario import load
 from rollover.spec.standards.codes import (
     MACHINES,
     STANDARDS,
@@ -22,6 +23,8 @@ from rollover.spec.standards.codes import (
     side_height,
 )
 from rollover.spec.standards.iso_3471 import excavator, piece_at
+from rollover.spec.standards.machine_codes import iso_12117_2, outside
+from rollover.system.errors import InputError
 
 
 def by_name(rows: tuple, name: str):
@@ -135,7 +138,8 @@ def test_iso_3471_worked_value_and_scope() -> None:
 
 def test_every_requirement_has_a_source_and_a_grade() -> None:
     tractor = Tractor(mass=3000.0, wheelbase=2.25, pitch_inertia=5430.0, width=1.9, rops_width=1.2, folding=True)
-    rows = [r for standard in STANDARDS.values() for r in standard(tractor)]
+    rows = [r for name, standard in STANDARDS.items() if not outside(name, 3000.0) for r in standard(tractor)]
+    rows += iso_12117_2(20_000.0)
     rows += [r for name in MACHINES for r in iso_3471_requirements(name, 12_000.0)]
     assert len(rows) > 50
     for r in rows:
@@ -150,3 +154,44 @@ def test_refused() -> None:
         Tractor(mass=0.0)
     with pytest.raises(ValueError, match="rear_share"):
         Tractor(mass=1.0, rear_share=1.5)
+
+
+def test_codes_of_machines_beside_those_of_tractors() -> None:
+    """At 10 t m = 1: crawler 70 kN and 13 kJ; skidder as a wheel loader 6 M and 12.5 kJ; excavator 35 kN and 13 kJ."""
+    ten = Tractor(mass=10_000.0)
+    for code, side, energy, above in (
+        ("code-8", 70_000.0, 13_000.0, 196_100.0),
+        ("iso-8082-1", 60_000.0, 12_500.0, 196_100.0),
+        ("iso-12117-2", 35_000.0, 13_000.0, 127_500.0),
+    ):
+        rows = STANDARDS[code](ten)
+        values = [by_name(rows, name).value for name in ("side force", "side energy", "vertical force")]
+        assert values == pytest.approx([side, energy, above]), code
+        # of a run the first force is held against the vertical one, an energy against the side it came from
+        assert next(r for r in rows if r.quantity == "force").name == "vertical force"
+        assert next(r for r in rows if r.quantity == "energy").come_from == ("left", "right")
+        assert all(r.confidence != "source checked" for r in rows)
+    assert by_name(iso_12117_2(10_000.0), "longitudinal energy").value == pytest.approx(4300.0)
+
+
+@pytest.mark.parametrize(
+    ("code", "mass", "said"),
+    [
+        ("iso-12117-2", 6000.0, "got 6000 kg; more than 6000 and less than 50000 kg"),
+        ("iso-12117-2", 50_000.0, "got 50000 kg"),
+        ("code-8", 700.0, "got 700 kg; more than 700 kg"),
+        ("iso-8082-1", 450.0, "got 450 kg; more than 700 kg"),
+        ("code-4", 450.0, ""),
+        ("iso-12117-2", 6001.0, ""),
+    ],
+)
+def test_a_code_is_asked_within_its_scope(code: str, mass: float, said: str) -> None:
+    found = outside(code, mass)
+    assert said in found
+    assert bool(found) == bool(said)
+
+
+def test_a_scenario_outside_the_scope_is_refused() -> None:
+    with pytest.raises(InputError, match=r"loads\.standards\.1: 'iso-12117-2' is outside its scope, got 3000 kg"):
+        load("side_overturn").replaced({"loads.standards": ["code-4", "iso-12117-2"]})
+    assert load("side_overturn").replaced({"loads.standards": ["code-8"]}).loads.standards == ("code-8",)

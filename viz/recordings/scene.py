@@ -67,6 +67,10 @@ def _vehicle(vehicle: Vehicle | RigidBody) -> tuple[Part, ...]:
         if not mass.outline:
             # it cannot touch anything: seen through, in the size that its inertia gives it
             found.append(dataclasses.replace(_equivalent(mass.body, f"{root}/mass"), colour=LOAD, see_through=True))
+    if isinstance(vehicle, Vehicle) and (occupant := vehicle.occupant) is not None:
+        found += [_solid(s, f"{chassis}/seat_{s.name}", DARK_STEEL) for s in occupant.seat_boxes]
+        for part, shape in occupant.outlines.items():
+            found.append(_solid(shape, f"{body_path(f'occupant_{part}')}/{part}", LOAD))
     return tuple(found)
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rollover.spec.standards.iso_3471 import MACHINES, Machine, iso_3471_requirements
+from rollover.spec.standards.machine_codes import code_8, iso_8082_1, iso_12117_2
 from rollover.spec.standards.requirement import Confidence, Requirement
 
 __all__ = [
@@ -207,6 +208,9 @@ STANDARDS: dict[str, Callable[[Tractor], tuple[Requirement, ...]]] = {
     "code-7": code_7,
     "sae-j1194": osha,
     "sae-j2194": j2194,
+    "code-8": lambda tractor: code_8(tractor.mass),
+    "iso-8082-1": lambda tractor: iso_8082_1(tractor.mass),
+    "iso-12117-2": lambda tractor: iso_12117_2(tractor.mass),
 }
 
 
