@@ -43,10 +43,9 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
     first, left = with_conditions_refitted(
         problem, first, mismatch_of(problem.dataset, first.fitted.blocks, phases), phases
     )
-    shared = problem.samples_per_error
-    if shared > 1.0:
+    if problem.samples_per_error > 1.0:
         # a rig repeats its discrepancy: it is one draw for all recordings, however many there are, (D21)
-        first = replace(first, p_value=by_chance(first.base, first.rivals, looked, shared * len(problem.dataset)))
+        first = replace(first, p_value=by_chance(first.base, first.rivals, looked, problem.samples_per_draw))
     first = first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map)
     leader = best_predictor(problem, first, groups)
     if leader is not first.fitted:
@@ -68,11 +67,27 @@ def best_predictor(problem: Problem, one: Step, groups: Groups) -> Fitted:
     """The fit that leads a step: its best, unless another predicts surely more of what conditions held out miss.
 
     Simplicity prefers what is hardly worse by the errors of samples; conditions are what tells beside a discrepancy.
+    But they repeat it, and a further number is bent to it in each: it must gain more than that, (D23).
     """
-    able = [f for f in one.rivals if not ends_at_bound(f)]
+    able = [f for f in one.rivals if not ends_at_bound(f) and is_worth_its_numbers(problem, f, one.fitted)]
     ahead = min(able, key=lambda f: held_out(f, groups).left.sum(), default=one.fitted)
     more = share_beyond(problem, one.base, one.fitted, ahead, groups)
     return one.fitted if more is None or more.low <= 0.0 else ahead
+
+
+def is_worth_its_numbers(problem: Problem, fitted: Fitted, simple: Fitted) -> bool:
+    """Whether a fit gains more over one of fewer numbers than these by chance do of one draw of the discrepancy, (D23).
+
+    With one draw for all recordings each number that is bent to it gains a chi-square of one degree of freedom, in
+    units of the samples that share it.
+    """
+    from scipy.special import chdtri
+
+    more = len(fitted.x) - len(simple.x)
+    if more <= 0:
+        return True
+    dispersion = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks)) * problem.samples_per_draw
+    return bool(simple.left - fitted.left > dispersion * chdtri(more, TUNING.number_p_value))
 
 
 def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:

@@ -110,10 +110,14 @@ class Problem(Simulations):
     @property
     def samples_per_error(self) -> float:
         """Samples that share one error: those of a signal where a scatter or a tolerance prevails, else 1."""
-        shared = [e.shared(s) for e in self.dataset for s in e.signals]
-        if not all(e.model_error_dominates(s) for e in self.dataset for s in e.signals):
-            return 1.0
-        return sum(shared) / len(shared)
+        every = [(e, s) for e in self.dataset for s in e.signals]
+        is_shared = all(e.model_error_dominates(s) for e, s in every)
+        return sum(e.shared(s) for e, s in every) / len(every) if is_shared else 1.0
+
+    @property
+    def samples_per_draw(self) -> float:
+        """Samples of all recordings that share one error: a rig repeats its own in each, (D21); 1 where none is."""
+        return self.samples_per_error * (len(self.dataset) if self.samples_per_error > 1.0 else 1)
 
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less predicted, stacked, SI, of each recording."""
