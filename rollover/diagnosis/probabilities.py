@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.inference.discrepancy import MEDIAN, SCALES, SPREAD, residual_rms
 from rollover.diagnosis.selection.decision import Explanation, strongest
 from rollover.diagnosis.settings import SETTINGS
@@ -40,6 +40,11 @@ def probabilities(
     summed: dict[str, float] = {}
     for name, w in zip(names, weight, strict=True):
         summed[name] = summed.get(name, 0.0) + float(w)
+    if is_noise:
+        # what no table holds is seldom met down to noise by what one holds, and as seldom hidden in it
+        met = TUNING.not_listed * TUNING.met_by_chance
+        missed = met / (met + 1.0 - TUNING.not_listed)
+        summed = {name: (1.0 - missed) * p for name, p in summed.items()} | {NOT_LISTED: missed}
     return dict(sorted(summed.items(), key=lambda one: -one[1]))
 
 
@@ -61,8 +66,7 @@ def _beside_noise(problem: Problem, tried: Explanation, found: Explanation) -> I
     if len(found.fitted.effects) > 1:
         name = strongest(problem, found.base, found.fitted).id
         every.append((name, evidence(base.left - found.fitted.left, len(found.fitted.x))))
-    # what no table holds is seldom met down to noise by what one holds, and as seldom hidden in it
-    return [*every, (NOT_LISTED, max(v for _, v in every) + float(np.log(TUNING.met_by_chance)))]
+    return every
 
 
 def _beside_discrepancy(problem: Problem, tried: Explanation) -> Iterable[tuple[str, float]]:
