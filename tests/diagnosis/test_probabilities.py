@@ -46,6 +46,13 @@ def test_what_leaves_as_much_is_as_probable(monkeypatch: pytest.MonkeyPatch) -> 
     assert found["soil-layer"] > 0.45
 
 
+def test_of_two_that_leave_as_much_the_one_of_fewer_numbers_is_likelier(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "residual_rms", lambda _, f: dict.fromkeys(CHANNELS, 0.02 if f.candidates else 0.1))
+    tried = explanation((2.0,) * DROPS, fitted("soil-layer", (1.0,) * DROPS, 2), fitted("mass", (1.0,) * DROPS))
+    found = probabilities(PROBLEM, tried, tried, 40, is_noise=False)
+    assert found["mass"] == pytest.approx(found["soil-layer"] * np.sqrt(2.0 * len(CHANNELS)))
+
+
 def test_what_models_usually_miss_is_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     found = beside(monkeypatch, 0.02, {"soil-layer": 0.016, "soil-crust": 0.018})
     assert found["nothing"] > 0.6
