@@ -14,6 +14,7 @@ from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.inference.repeated_course import predicted_by_others, quick_channels
 from rollover.diagnosis.inference.residual_law import fitted_law
+from rollover.diagnosis.probabilities import credible
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import Explanation, kind_of
@@ -124,17 +125,21 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
     """The best and what cannot be told from it beside a discrepancy that was estimated.
 
     That was estimated from what the best leaves, whose form need not be the right one: a rival that explains nearly all
-    that the best does is not excluded where it leaves no more than the discrepancy, or is of the same family.
+    that the best does is not excluded where it leaves no more than the discrepancy, or is of the same family. Nor is
+    one that explains half as much and belongs to those that hold the right one with 95 % by what they leave, (D25).
     """
     near = confusion(one, groups, problem.samples_per_error)
     best, start = one.fitted, float(held_out(one.base, groups).left.sum())
-    least = TUNING.nearly_all * (start - float(held_out(best, groups).left.sum()))
+    most = start - float(held_out(best, groups).left.sum())
+    probable = credible(problem, one.rivals)
     for rival in one.rivals:
         becomes_best = len(rival.x) > len(best.x) and ends_at_bound(rival)
         if becomes_best or any(rival is f for f in near):
             continue
         is_as_near = is_tolerated(problem, rival) or rival.candidates[-1].family == best.candidates[-1].family
-        if is_as_near and start - float(held_out(rival, groups).left.sum()) >= least:
+        gain = start - float(held_out(rival, groups).left.sum())
+        is_probable = gain > TUNING.half_share * most and any(rival is f for f in probable)
+        if (is_as_near and gain >= TUNING.nearly_all * most) or is_probable:
             near.append(rival)
     return near
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.inference.discrepancy import MEDIAN, SCALES, SPREAD, residual_rms
 from rollover.diagnosis.selection.decision import Explanation, strongest
 from rollover.diagnosis.settings import SETTINGS
@@ -72,13 +72,26 @@ def _beside_noise(problem: Problem, tried: Explanation, found: Explanation) -> I
 def _beside_discrepancy(problem: Problem, tried: Explanation) -> Iterable[tuple[str, float]]:
     """Name and log evidence of each explanation by what it leaves of each channel, (D25)."""
     left = residual_rms(problem, tried.base)
-    told = {c: resolution(problem, c) for c in left}
-    numbers = float(np.log(DRAWS * len(left)))
-    yield NOTHING, sum(log_usual(v, told[c]) for c, v in left.items())
-    yield NOT_LISTED, sum(log_touched(v, told[c]) for c, v in left.items())
+    yield NOTHING, log_evidence(problem, tried.base)
+    yield NOT_LISTED, sum(log_touched(v, resolution(problem, c)) for c, v in left.items())
     for f in tried.first.rivals if tried.first is not None else ():
-        own = residual_rms(problem, f)
-        yield f.candidates[-1].id, sum(log_usual(v, told[c]) for c, v in own.items()) - 0.5 * len(f.x) * numbers
+        yield f.candidates[-1].id, log_evidence(problem, f)
+
+
+def log_evidence(problem: Problem, fitted: Fitted) -> float:
+    """Log evidence of a fit beside a discrepancy that is one draw for all recordings, (D25)."""
+    left = residual_rms(problem, fitted)
+    usual = sum(log_usual(v, resolution(problem, c)) for c, v in left.items())
+    return usual - 0.5 * len(fitted.x) * float(np.log(DRAWS * len(left)))
+
+
+def credible(problem: Problem, fits: Sequence[Fitted]) -> list[Fitted]:
+    """The fewest of some fits that hold the right one with 95 %, were it one of them, the most probable first."""
+    score = np.array([log_evidence(problem, f) for f in fits])
+    weight = np.exp(score - score.max())
+    order = np.argsort(-weight, kind="stable")
+    held = np.cumsum(weight[order]) / weight.sum()
+    return [fits[k] for k in order[: int(np.searchsorted(held, TUNING.credible)) + 1]]
 
 
 def resolution(problem: Problem, channel: str) -> float:

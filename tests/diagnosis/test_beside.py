@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from rollover.diagnosis import alone
 from rollover.diagnosis.alone import alike_beside, best_predictor, verdict_on_single_effect
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
@@ -149,7 +150,8 @@ def test_what_drops_repeat_prefers_none_of_two_as_often_as_there_are_drops(share
     assert simplest([best, simple], GROUPS, shared)[0].candidates[-1].id == leads
 
 
-def test_rivals_akin_or_within_the_discrepancy_are_kept() -> None:
+def test_rivals_akin_or_within_the_discrepancy_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(alone, "credible", lambda _, fits: list(fits[:1]))
     best = fitted("soil-layer", (0.5,) * DROPS)
     rivals = {
         "soil-crust": (4.5,) * DROPS,  # of the same family, and explains nearly all
@@ -164,6 +166,13 @@ def test_rivals_akin_or_within_the_discrepancy_are_kept() -> None:
         "soil-crust",
         "soil-stiffness",
     ]
+    # and what may as well be the right one by what it leaves, if it explains half as much as the best
+    with monkeypatch.context() as patch:
+        patch.setattr(alone, "credible", lambda _, fits: list(fits))
+        offered = [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)]
+        assert offered == ["soil-layer", *rivals]
+        half = explanation((100.0,) * DROPS, best, fitted("guide-friction", (51.0,) * DROPS)).parts[0]
+        assert [f.candidates[-1].id for f in alike_beside(PROBLEM, half, GROUPS)] == ["soil-layer"]
     # one that becomes the best at the end of its range is the best itself
     at_an_end = fitted("soil-crust", (0.6,) * DROPS, numbers=2, x=1.0)
     step = explanation((100.0,) * DROPS, fitted("soil-layer", (0.5,) * DROPS), at_an_end).parts[0]

@@ -10,7 +10,7 @@ import pytest
 
 from rollover.diagnosis import probabilities as module
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.probabilities import log_touched, log_usual, probabilities
+from rollover.diagnosis.probabilities import credible, log_touched, log_usual, probabilities
 from rollover.diagnosis.selection.decision import Explanation
 from tests.diagnosis.test_beside import DROPS, explanation, fitted
 
@@ -70,6 +70,24 @@ def test_an_untouched_channel_speaks_against_an_effect_that_is_not_listed() -> N
     little, much = (log_touched(v, 1e-4) - log_usual(v, 1e-4) for v in (0.005, 0.3))
     assert little < -0.3
     assert much > 1.0
+
+
+@pytest.mark.parametrize(
+    ("others", "offered"),
+    [
+        ((0.06, 0.09), 1),  # far more is left by the others
+        ((0.025, 0.09), 2),  # 0.79 and 0.21 of the two
+        ((0.025, 0.022), 3),
+        ((0.019, 0.09), 2),
+    ],
+)
+def test_the_fewest_are_offered_that_hold_the_right_one(
+    monkeypatch: pytest.MonkeyPatch, others: tuple[float, float], offered: int
+) -> None:
+    left = dict(zip(("soil-layer", "soil-stiffness", "guide-friction"), (0.02, *others), strict=True))
+    monkeypatch.setattr(module, "residual_rms", lambda _, f: dict.fromkeys(CHANNELS, left[f.candidates[-1].id]))
+    found = credible(PROBLEM, [fitted(id, (1.0,) * DROPS) for id in left])
+    assert [f.candidates[-1].id for f in found] == sorted(left, key=lambda id: left[id])[:offered]
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,7 @@ class Probabilities:
     met_by_chance: float = 0.15
     # shares of a channel's range: 5 % and 95 % quantiles of what an effect worth a name moves it by; chosen
     effect_range: tuple[float, ...] = (0.01, 1.0)
+    credible: float = 0.95  # probability of the names that are offered together to hold the right one; usual level
     every: int = 8  # of the scales that are tried one in so many where two are tried at once; steps of 10 %
 
 
