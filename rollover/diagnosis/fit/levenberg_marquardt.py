@@ -54,11 +54,8 @@ class Problem(Simulations):
             self._near = Problem(dataset)
         else:
             self._near.with_noise_model(dataset)
-        self._near.shifts, self._near.heavy_tailed, self._near._fixed_shifts = (
-            list(self.shifts),
-            self.heavy_tailed,
-            self._fixed_shifts,
-        )
+        self._near.shifts, self._near.heavy_tailed = list(self.shifts), self.heavy_tailed
+        self._near._fixed_shifts = self._fixed_shifts
         return self._near
 
     def beginning(self, base: Fitted) -> tuple[Problem, Fitted]:
