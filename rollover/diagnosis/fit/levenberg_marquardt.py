@@ -113,8 +113,9 @@ class Problem(Simulations):
 
     @property
     def samples_per_draw(self) -> float:
-        """Samples of all recordings that share one error: a rig repeats its own in each, (D21); 1 where none is."""
-        return self.samples_per_error * (len(self.dataset) if self.samples_per_error > 1.0 else 1)
+        """Samples that share one error in all recordings: a rig repeats its discrepancy, (D21), runs no scatter."""
+        is_repeated = self.samples_per_error > 1.0 and any(e.discrepancy for e in self.dataset)
+        return self.samples_per_error * (len(self.dataset) if is_repeated else 1)
 
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less predicted, stacked, SI, of each recording."""
