@@ -36,7 +36,7 @@ from tests.rollover.diagnosed import nothing_found
 def test_a_second_opinion_is_asked_of_what_is_unexplained(
     monkeypatch: pytest.MonkeyPatch, first: Verdict, stated: dict[str, Any], second: bool
 ) -> None:
-    yielding = []
+    yielding: list[bool] = []
 
     def concluded(asked: Asked, *_: object) -> Conclusion:
         yielding.append(asked.yields)
