@@ -14,6 +14,7 @@ from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.inference.repeated_course import predicted_by_others, quick_channels
 from rollover.diagnosis.inference.residual_law import fitted_law
+from rollover.diagnosis.probabilities import credible
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import Explanation, kind_of
@@ -43,10 +44,9 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
     first, left = with_conditions_refitted(
         problem, first, mismatch_of(problem.dataset, first.fitted.blocks, phases), phases
     )
-    shared = problem.samples_per_error
-    if shared > 1.0:
+    if problem.samples_per_error > 1.0:
         # a rig repeats its discrepancy: it is one draw for all recordings, however many there are, (D21)
-        first = replace(first, p_value=by_chance(first.base, first.rivals, looked, shared * len(problem.dataset)))
+        first = replace(first, p_value=by_chance(first.base, first.rivals, looked, problem.samples_per_draw))
     first = first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map)
     leader = best_predictor(problem, first, groups)
     if leader is not first.fitted:
@@ -68,11 +68,27 @@ def best_predictor(problem: Problem, one: Step, groups: Groups) -> Fitted:
     """The fit that leads a step: its best, unless another predicts surely more of what conditions held out miss.
 
     Simplicity prefers what is hardly worse by the errors of samples; conditions are what tells beside a discrepancy.
+    But they repeat it, and a further number is bent to it in each: it must gain more than that, (D23).
     """
-    able = [f for f in one.rivals if not ends_at_bound(f)]
+    able = [f for f in one.rivals if not ends_at_bound(f) and is_worth_its_numbers(problem, f, one.fitted)]
     ahead = min(able, key=lambda f: held_out(f, groups).left.sum(), default=one.fitted)
     more = share_beyond(problem, one.base, one.fitted, ahead, groups)
     return one.fitted if more is None or more.low <= 0.0 else ahead
+
+
+def is_worth_its_numbers(problem: Problem, fitted: Fitted, simple: Fitted) -> bool:
+    """Whether a fit gains more over one of fewer numbers than these by chance do of one draw of the discrepancy, (D23).
+
+    With one draw for all recordings each number that is bent to it gains a chi-square of one degree of freedom, in
+    units of the samples that share it.
+    """
+    from scipy.special import chdtri
+
+    more = len(fitted.x) - len(simple.x)
+    if more <= 0:
+        return True
+    dispersion = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks)) * problem.samples_per_draw
+    return bool(simple.left - fitted.left > dispersion * chdtri(more, TUNING.number_p_value))
 
 
 def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:
@@ -109,17 +125,21 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
     """The best and what cannot be told from it beside a discrepancy that was estimated.
 
     That was estimated from what the best leaves, whose form need not be the right one: a rival that explains nearly all
-    that the best does is not excluded where it leaves no more than the discrepancy, or is of the same family.
+    that the best does is not excluded where it leaves no more than the discrepancy, or is of the same family. Nor is
+    one that explains half as much and belongs to those that hold the right one with 95 % by what they leave, (D25).
     """
     near = confusion(one, groups, problem.samples_per_error)
     best, start = one.fitted, float(held_out(one.base, groups).left.sum())
-    least = TUNING.nearly_all * (start - float(held_out(best, groups).left.sum()))
+    most = start - float(held_out(best, groups).left.sum())
+    probable = credible(problem, one.rivals)
     for rival in one.rivals:
         becomes_best = len(rival.x) > len(best.x) and ends_at_bound(rival)
         if becomes_best or any(rival is f for f in near):
             continue
         is_as_near = is_tolerated(problem, rival) or rival.candidates[-1].family == best.candidates[-1].family
-        if is_as_near and start - float(held_out(rival, groups).left.sum()) >= least:
+        gain = start - float(held_out(rival, groups).left.sum())
+        is_probable = gain > TUNING.half_share * most and any(rival is f for f in probable)
+        if (is_as_near and gain >= TUNING.nearly_all * most) or is_probable:
             near.append(rival)
     return near
 

@@ -50,6 +50,7 @@ def account(
             "dependencies": [{"on": name, "share": share} for name, share in found.dependencies],
             "degrees_of_freedom": [asdict(d) for d in found.degrees],
             "effects": [_effect(e) for e in found.effects],
+            **({"probabilities": dict(found.probabilities)} if found.probabilities else {}),
             "discrepancy": {channel: asdict(scale) for channel, scale in found.discrepancy.items()},
             "invariants": {"checked": len(found.checked), "broken": list(found.broken)},
             "fit": {

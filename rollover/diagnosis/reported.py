@@ -23,6 +23,7 @@ from rollover.diagnosis.inference.scores import judged, misfit_before_impact
 from rollover.diagnosis.inference.vehicle_dependence import dependency
 from rollover.diagnosis.planning.by_fits import next_test
 from rollover.diagnosis.power import is_weak
+from rollover.diagnosis.probabilities import NOTHING, probabilities
 from rollover.diagnosis.result import Degree, Diagnosis, Draws, Named, Share
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
@@ -150,7 +151,19 @@ def reported(c: Conclusion) -> Diagnosis:
         discrepancy=told_of,
         by_itself=shown is not None,
         posterior=_draws(c) if effects else None,
+        probabilities=_probabilities(c, remains=remains),
     )
+
+
+def _probabilities(c: Conclusion, *, remains: bool) -> dict[str, float]:
+    """Of each name; none of full runs, of a model of one's own, and of what recordings show by themselves."""
+    if c.acts != "drop" or c.asked.scenario is None or c.shown is not None:
+        return {}
+    is_noise = not remains and c.problem.samples_per_error == 1.0
+    found = probabilities(c.problem, c.tried, c.explanation, len(c.candidates), is_noise=is_noise)
+    for slight in {e.id for e in c.slight} & found.keys():  # what is of no consequence is none worth a name
+        found[NOTHING] += found.pop(slight)
+    return dict(sorted(found.items(), key=lambda one: -one[1]))
 
 
 def _draws(c: Conclusion) -> Draws | None:

@@ -211,6 +211,7 @@ class Diagnosis:
     checked: tuple[str, ...] = ()  # invariants that were checked
     broken: tuple[str, ...] = ()  # those of them that do not hold
     posterior: Draws | None = None  # where it was asked for and something is named
+    probabilities: Mapping[str, float] = field(default_factory=dict)  # of each name to be what is missing, of drops
     baseline: Mapping[str, Interval] = field(default_factory=dict)  # what a model of one's own is always fitted by
 
     def _repr_html_(self) -> str:

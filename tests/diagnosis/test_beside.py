@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from rollover.diagnosis import alone
 from rollover.diagnosis.alone import alike_beside, best_predictor, verdict_on_single_effect
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
@@ -16,7 +17,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.result import Share
 from rollover.diagnosis.selection.decision import Explanation
-from rollover.diagnosis.selection.forward_step import by_chance
+from rollover.diagnosis.selection.forward_step import by_chance, simplest
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.statements import usual_model_error_sentence
 from rollover.effects import EFFECTS, Search
@@ -30,6 +31,7 @@ PROBLEM = cast(
     SimpleNamespace(
         dataset=[SimpleNamespace(signals=[SIGNAL], model_error_dominates=lambda s: True)] * DROPS,
         samples_per_error=10.0,
+        samples_per_draw=10.0 * DROPS,
         effort=SimpleNamespace(is_ensemble=False),
     ),
 )
@@ -45,7 +47,8 @@ def fitted(id: str, left: Sequence[float], numbers: int = 1, x: float = 0.5) -> 
         blocks.append(
             ResidualBlock(residual=w, J=np.zeros((SAMPLES, numbers)), slope=np.zeros(SAMPLES), shift=0.0, prior=1.0)
         )
-    search = {f"n{k}": Search(0.0, 1.0) for k in range(numbers)}
+    names = [*EFFECTS[id].search, "n1", "n2"][:numbers]
+    search = {name: Search(0.0, 1.0) for name in names}
     candidate = Candidate(id=id, kind=EFFECTS[id].kind, family=EFFECTS[id].family, search=search, fixed={})
     return Fitted(
         candidates=(candidate,),
@@ -122,7 +125,33 @@ def test_what_conditions_surely_prefer_leads(left: tuple[float, ...], x: float, 
     assert best_predictor(PROBLEM, one, GROUPS).candidates[-1].id == leads
 
 
-def test_rivals_akin_or_within_the_discrepancy_are_kept() -> None:
+@pytest.mark.parametrize(
+    ("base", "simple", "bent", "numbers", "leads"),
+    [
+        (9.0, 1.0, 0.5, 1, "soil-layer"),  # as few numbers: what conditions surely prefer
+        (9.0, 1.0, 0.5, 2, "soil-stiffness"),  # half an error for each sample: two draws of what all drops repeat
+        (9.0, 4.0, 1.0, 2, "soil-layer"),  # twelve of them for one number
+        (9.0, 2.2, 1.0, 3, "soil-stiffness"),  # five for two
+        (9.0, 2.2, 1.0, 2, "soil-layer"),
+    ],
+)
+def test_a_further_number_gains_more_than_a_draw_of_the_discrepancy(
+    base: float, simple: float, bent: float, numbers: int, leads: str
+) -> None:
+    one = fitted("soil-stiffness", (simple,) * DROPS)
+    rival = fitted("soil-layer", (bent,) * DROPS, numbers=numbers)
+    assert best_predictor(PROBLEM, explanation((base,) * DROPS, one, rival).parts[0], GROUPS).candidates[-1].id == leads
+
+
+@pytest.mark.parametrize(("shared", "leads"), [(10.0, "soil-layer"), (10.0 * DROPS, "soil-stiffness")])
+def test_what_drops_repeat_prefers_none_of_two_as_often_as_there_are_drops(shared: float, leads: str) -> None:
+    """An excess of 240 squares of six drops: 1.7 standard errors of those that come anew, 0.7 of what is repeated."""
+    best, simple = fitted("soil-layer", (0.5,) * DROPS, numbers=2), fitted("soil-stiffness", (1.5,) * DROPS)
+    assert simplest([best, simple], GROUPS, shared)[0].candidates[-1].id == leads
+
+
+def test_rivals_akin_or_within_the_discrepancy_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(alone, "credible", lambda _, fits: list(fits[:1]))
     best = fitted("soil-layer", (0.5,) * DROPS)
     rivals = {
         "soil-crust": (4.5,) * DROPS,  # of the same family, and explains nearly all
@@ -137,6 +166,13 @@ def test_rivals_akin_or_within_the_discrepancy_are_kept() -> None:
         "soil-crust",
         "soil-stiffness",
     ]
+    # and what may as well be the right one by what it leaves, if it explains half as much as the best
+    with monkeypatch.context() as patch:
+        patch.setattr(alone, "credible", lambda _, fits: list(fits))
+        offered = [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)]
+        assert offered == ["soil-layer", *rivals]
+        half = explanation((100.0,) * DROPS, best, fitted("guide-friction", (51.0,) * DROPS)).parts[0]
+        assert [f.candidates[-1].id for f in alike_beside(PROBLEM, half, GROUPS)] == ["soil-layer"]
     # one that becomes the best at the end of its range is the best itself
     at_an_end = fitted("soil-crust", (0.6,) * DROPS, numbers=2, x=1.0)
     step = explanation((100.0,) * DROPS, fitted("soil-layer", (0.5,) * DROPS), at_an_end).parts[0]

@@ -164,7 +164,12 @@ def test_samples_of_two_correlation_times_share_one_error() -> None:
     sizes = [s.rows.size for e in whole.dataset for s in e.signals]
     assert whole.samples_per_error == pytest.approx(np.mean(sizes))
     assert some.samples_per_error == pytest.approx(2.0 * 0.03 * 300.0, rel=0.01)  # 300 Hz
-    assert judged(recorded({}, 3, noise=0.01)).samples_per_error == 1.0
+    # which a rig repeats in each of the three drops
+    assert some.samples_per_draw == pytest.approx(3.0 * some.samples_per_error)
+    tolerated = Problem([replace(e, discrepancy={}, memory={}, model_error=0.1) for e in some.dataset])
+    assert tolerated.samples_per_draw == tolerated.samples_per_error > 1.0
+    noise = judged(recorded({}, 3, noise=0.01))
+    assert (noise.samples_per_error, noise.samples_per_draw) == (1.0, 1.0)
 
 
 def test_a_discrepancy_is_of_its_channel_and_above_the_noise() -> None:

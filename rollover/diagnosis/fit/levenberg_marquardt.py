@@ -54,11 +54,8 @@ class Problem(Simulations):
             self._near = Problem(dataset)
         else:
             self._near.with_noise_model(dataset)
-        self._near.shifts, self._near.heavy_tailed, self._near._fixed_shifts = (
-            list(self.shifts),
-            self.heavy_tailed,
-            self._fixed_shifts,
-        )
+        self._near.shifts, self._near.heavy_tailed = list(self.shifts), self.heavy_tailed
+        self._near._fixed_shifts = self._fixed_shifts
         return self._near
 
     def beginning(self, base: Fitted) -> tuple[Problem, Fitted]:
@@ -110,10 +107,15 @@ class Problem(Simulations):
     @property
     def samples_per_error(self) -> float:
         """Samples that share one error: those of a signal where a scatter or a tolerance prevails, else 1."""
-        shared = [e.shared(s) for e in self.dataset for s in e.signals]
-        if not all(e.model_error_dominates(s) for e in self.dataset for s in e.signals):
-            return 1.0
-        return sum(shared) / len(shared)
+        every = [(e, s) for e in self.dataset for s in e.signals]
+        is_shared = all(e.model_error_dominates(s) for e, s in every)
+        return sum(e.shared(s) for e, s in every) / len(every) if is_shared else 1.0
+
+    @property
+    def samples_per_draw(self) -> float:
+        """Samples that share one error in all recordings: a rig repeats its discrepancy, (D21), runs no scatter."""
+        is_repeated = self.samples_per_error > 1.0 and any(e.discrepancy for e in self.dataset)
+        return self.samples_per_error * (len(self.dataset) if is_repeated else 1)
 
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less predicted, stacked, SI, of each recording."""

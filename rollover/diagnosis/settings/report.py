@@ -27,6 +27,7 @@ class Grades:
     # share of the mismatch that the true effects explain at least; what resembles an unlisted effect leaves more;
     # chosen
     nearly_all: float = 0.95
+    number_p_value: float = 0.05  # p-value of the gain of a further number beside a discrepancy; usual level
     one_sided_confidence: float = 0.975  # probability: one side of a 95 % interval; definition
 
 
@@ -45,6 +46,20 @@ class Power:
 
     # share of the effects that would not have shown: above it nothing can be concluded; chosen
     blind_share: float = 0.6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Probabilities:
+    """Probabilities over names."""
+
+    nothing: float = 0.4  # probability before any recording that nothing is missing; as likely as that one of all is
+    not_listed: float = 0.2  # the same of what no table holds: half as likely as what one does; chosen
+    # share of unlisted effects that a listed one meets down to noise; three of twenty in the proof
+    met_by_chance: float = 0.15
+    # shares of a channel's range: 5 % and 95 % quantiles of what an effect worth a name moves it by; chosen
+    effect_range: tuple[float, ...] = (0.01, 1.0)
+    credible: float = 0.95  # probability of the names that are offered together to hold the right one; usual level
+    every: int = 8  # of the scales that are tried one in so many where two are tried at once; steps of 10 %
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +95,7 @@ class Report:
     grades: Grades = Grades()  # grades of an answer
     invariants: Invariants = Invariants()  # checks of an answer against itself
     power: Power = Power()  # what a test could have shown
+    probabilities: Probabilities = Probabilities()  # probabilities over names
     sensors_first: SensorsFirst = SensorsFirst()  # faults of sensors
     statements: Statements = Statements()  # sentences
     late_clocks: LateClocks = LateClocks()  # late clocks
