@@ -165,7 +165,7 @@ def run(scenario: str | Path | Scenario, *, half_step: bool = True, ensemble: in
 def _page(of: Run) -> str:
     from viz.pages.report import page
 
-    return page(of.result, of.peaks, of.account, rows=of.criteria, near=of.approaches, command="rollover.run(scenario)")
+    return page(of.result, of.peaks, of.as_dict, rows=of.criteria, near=of.approaches, command="rollover.run(scenario)")
 
 
 def compare(
@@ -376,10 +376,8 @@ def study(
     one_of("retry", retry, ("", "failed"))
     ready = prepared(studies.find(study), None if out is None else Path(out), force=force)
     way = Way(workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry)
-    account = ready.carried_out(
-        way, page=lambda done, table: page(ready.study, done, table, command="rollover.study()")
-    )
-    return {str(key): value for key, value in plain(account).items()}
+    report = ready.carried_out(way, page=lambda done, table: page(ready.study, done, table, command="rollover.study()"))
+    return {str(key): value for key, value in plain(report).items()}
 
 
 def __getattr__(name: str) -> object:

@@ -64,10 +64,10 @@ class AssessedRun:
         return self.result.recording
 
     @property
-    def account(self) -> Mapping[str, Any]:
+    def as_dict(self) -> Mapping[str, Any]:
         """What run.json says."""
         rows = [asdict(row) for row in self.criteria]
-        return results.account(self.result, self.peaks, rows, self.half_step)
+        return results.json_of(self.result, self.peaks, rows, self.half_step)
 
     def to_arrow(self) -> Table:
         """Channels as an Arrow table: `time` (s) and a column for each channel (SI), units and meanings as metadata.

@@ -189,7 +189,7 @@ class _Goal:
         return not self.absorbed
 
     def _overloaded(self, points: list[Point]) -> bool:
-        """Whether the overload test asks for more energy; its account goes into `over`."""
+        """Whether the overload test asks for more energy; its report goes into `over`."""
         assert self.load.energy is not None
         x, y = np.array([(p.deflection, p.force) for p in points]).T
         extra, now = self.target / self.load.energy - 1.0, points[-1]

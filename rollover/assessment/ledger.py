@@ -87,7 +87,7 @@ def resolution(run: Run) -> float:
 
 
 def of_cases(ledger: Mapping[str, Any]) -> str:
-    """In how many cases of a study the ledger stays open, by what its account says, and the cure."""
+    """In how many cases of a study the ledger stays open, by what its report says, and the cure."""
     most = percent(ledger["largest_residual"])
     return (
         f"The energy ledger does not close in {ledger['open']} cases: up to {most} of the "

@@ -115,20 +115,20 @@ def _say_replaced(say: Callable[[str], None] | None, folder: Path, what: str, fo
         say(f"{folder}: replaces the {what} of this scenario as it was before it was changed (hash {old})")
 
 
-def claim_account(
+def claim_report(
     folder: Path,
     form: str,
     about: Mapping[str, Any],
     files: Sequence[str],
     *,
     force: bool = False,
-    own_account: Callable[[Mapping[str, Any]], str] | None = None,
+    own_report: Callable[[Mapping[str, Any]], str] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Path:
     """Like `claim`, for what other commands write: `files`, the first of them JSON of the format `form`.
 
-    The same command's account of the same things, those that `about` names, is written again without `force`; so is
-    one that differs in the scenario's hash alone, its `origin` being the same, and one of which `own_account` says in a
+    The same command's report of the same things, those that `about` names, is written again without `force`; so is
+    one that differs in the scenario's hash alone, its `origin` being the same, and one of which `own_report` says in a
     sentence why it may be replaced. Both are said.
     """
     target, names = _own_files(folder, files, files[0])
@@ -142,13 +142,13 @@ def claim_account(
     if others <= {"origin"} and found.get("format") == form:
         return target
     if others == {"scenario_hash"} and "origin" in about and found.get("format") == form:
-        _say_replaced(say, folder, "account", found)
+        _say_replaced(say, folder, "report", found)
         return target
     if (
         isinstance(found, dict)
         and found.get("format") == form
-        and own_account is not None
-        and (why := own_account(found))
+        and own_report is not None
+        and (why := own_report(found))
     ):
         if say is not None:
             say(f"{folder}: {why}")
@@ -200,7 +200,7 @@ def write(
         if picture is not None:
             picture(part / PICTURE)
         names = sorted([*(p.name for p in part.iterdir()), RUN, *([PAGE] if page is not None else [])])
-        answer = account(run, peaks, criteria, half_step, names)
+        answer = json_of(run, peaks, criteria, half_step, names)
         if made_from is not None:
             answer["origin"] = plain(made_from)
         write_json(part / RUN, answer)
@@ -223,7 +223,7 @@ def read_run_json(folder: Path) -> dict[str, Any]:
     return found
 
 
-def account(
+def json_of(
     run: Run,
     peaks: Sequence[PeakLoad],
     criteria: Sequence[Mapping[str, Any]] = (),

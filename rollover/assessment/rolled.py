@@ -133,7 +133,7 @@ def _fault(e: ValueError, given: Mapping[str, Any]) -> InputError:
     return InputError(Fault(file=OPTION if symbol in given else "", path=symbol, message=message))
 
 
-def account(of: Asked, found: Rolling, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def json_of(of: Asked, found: Rolling, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """What rolling.json says; `about` names what was asked."""
     unit = quantities(NarrowTractor)
     return {

@@ -108,7 +108,7 @@ def scenario_of(name: str | Path) -> Scenario:
     )
 
 
-def account(found: Stability, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def json_of(found: Stability, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """What stability.json says; `about` names what was asked."""
     vehicle = found.scenario.vehicle
     assert isinstance(vehicle, Vehicle)

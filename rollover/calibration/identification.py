@@ -137,7 +137,7 @@ def identified(
     )
 
 
-def account(found: Identification) -> dict[str, Any]:
+def json_of(found: Identification) -> dict[str, Any]:
     """What identify.json says."""
     return {
         **found.numbers,

@@ -125,7 +125,7 @@ def _misfit(run: Run, recording: Recording, name: str, cfc: int | None) -> Misfi
     return replace(found, zero=at.zero)
 
 
-def account(found: Comparison, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def json_of(found: Comparison, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """What compare.json says; `about` names what was asked."""
     runs = found.runs
     return {

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rollover.diagnosis.io import account, diagnose_folder, diagnosed_text
+from rollover.diagnosis.io import diagnose_folder, diagnosed_text, json_of
 from rollover.diagnosis.pipeline import diagnose
 from rollover.diagnosis.result import Diagnosis
 
-__all__ = ["Diagnosis", "account", "diagnose", "diagnose_folder", "diagnosed_text"]
+__all__ = ["Diagnosis", "diagnose", "diagnose_folder", "diagnosed_text", "json_of"]

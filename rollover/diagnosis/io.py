@@ -25,7 +25,7 @@ DRAWS = "posterior.csv"
 FILES = (JSON, SCENARIO, PAGE, PICTURE, DRAWS)
 
 
-def account(
+def json_of(
     found: Diagnosis, about: Mapping[str, Any] | None = None, prechecks: Sequence[Mapping[str, Any]] = ()
 ) -> dict[str, Any]:
     """What diagnosis.json says, bare JSON values; `about` names what was asked, `prechecks` what sensors gave away."""
@@ -152,4 +152,4 @@ def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> 
     """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says."""
     del out
     with Executor(workers) as executor:
-        return account(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), executor=executor))
+        return json_of(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), executor=executor))

@@ -48,9 +48,9 @@ class Handed:
 
 @dataclass(frozen=True, kw_only=True)
 class Proof:
-    """What a proof gives: prove.json (`account`), seal, truths, and each diagnosis by case."""
+    """What a proof gives: prove.json (`report`), seal, truths, and each diagnosis by case."""
 
-    account: dict[str, Any]
+    report: dict[str, Any]
     seal: Seal
     truths: list[dict[str, Any]]
     diagnoses: dict[str, dict[str, Any]]
@@ -148,7 +148,7 @@ def prove(
     for i, truth in enumerate(found):
         value, sentence, seconds = answers[i]
         rows.append({**score(truth, value, seconds), "failure": sentence})
-    account = {
+    report = {
         "format": FORMAT,
         "cases": count,
         "seed": seed,
@@ -161,4 +161,4 @@ def prove(
         "rows": rows,
     }
     diagnoses = {orders[i].name: value for i, (value, _, _) in sorted(answers.items()) if value is not None}
-    return Proof(account=account, seal=seal, truths=found, diagnoses=diagnoses)
+    return Proof(report=report, seal=seal, truths=found, diagnoses=diagnoses)

@@ -23,7 +23,7 @@ class Exported:
 
     truths: list[dict[str, Any]]
     seal: Seal
-    account: dict[str, Any]
+    report: dict[str, Any]
 
 
 def export(
@@ -39,12 +39,12 @@ def export(
 ) -> Exported:
     """Write cases into a folder, which is there already. Raises ``ValueError`` for what cannot be planned.
 
-    Seed, kinds and effects are no part of the account: they would tell the truth.
+    Seed, kinds and effects are no part of the report: they would tell the truth.
     """
     orders = orders_of(count, seed, rig=rig, kinds=kinds, effects=effects, background=background)
     truths = made_cases(orders, [folder / o.name for o in orders], rig=rig, workers=workers)
     cases = [{"case": o.name, "sha256": t["handed_over"]} for o, t in zip(orders, truths, strict=True)]
-    return Exported(truths=truths, seal=sealed(truths), account={"format": FORMAT, "rig": rig, "cases": cases})
+    return Exported(truths=truths, seal=sealed(truths), report={"format": FORMAT, "rig": rig, "cases": cases})
 
 
 @dataclass(frozen=True, kw_only=True)

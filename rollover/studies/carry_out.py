@@ -69,17 +69,17 @@ class Prepared:
                 done = conduct(chosen, target, way, lambda p: show(p.done, p.of, _note(p)))
             ran = time.perf_counter() - began
             builder = Builder(chosen)
-            account = {**_head(self, "done"), **answers(chosen, done), "ran": done.ran}
-            account["kept"] = len(set(done.keys)) - done.ran
-            account["integrator"] = _integrators(chosen, done)
-            account["reference_check"] = _reference(chosen, target, way, watch, done)
-            account["reliability"] = _reliability(chosen, builder, target, way, watch, say)
-            account["worst"] = _write_worst(target, chosen, builder, account)
-            account["run_time"] = ran
-            bare: dict[str, Any] = plain(account)
+            report = {**_head(self, "done"), **answers(chosen, done), "ran": done.ran}
+            report["kept"] = len(set(done.keys)) - done.ran
+            report["integrator"] = _integrators(chosen, done)
+            report["reference_check"] = _reference(chosen, target, way, watch, done)
+            report["reliability"] = _reliability(chosen, builder, target, way, watch, say)
+            report["worst"] = _write_worst(target, chosen, builder, report)
+            report["run_time"] = ran
+            bare: dict[str, Any] = plain(report)
             case_store.put_text(target / case_store.PAGE, page(done, bare))
             case_store.put_text(target / case_store.ACCOUNT, json.dumps(bare, indent=2, allow_nan=False) + "\n")
-        return account
+        return report
 
 
 def prepared(
@@ -132,9 +132,9 @@ def _begin(ready: Prepared) -> None:
         case_store.put_text(target / case_store.ACCOUNT, json.dumps(_head(ready, "running"), indent=2) + "\n")
 
 
-def _name_of(account: Path) -> str:
+def _name_of(report: Path) -> str:
     try:
-        return str(json.loads(account.read_text(encoding="utf-8")).get("name", ""))
+        return str(json.loads(report.read_text(encoding="utf-8")).get("name", ""))
     except (OSError, ValueError):
         return ""
 
@@ -208,9 +208,9 @@ def _reliability(
     return {**found, "output": output.name, "limit": limit, "design_values": point}
 
 
-def _write_worst(target: Path, chosen: Study, builder: Builder, account: dict[str, Any]) -> dict[str, Any] | None:
+def _write_worst(target: Path, chosen: Study, builder: Builder, report: dict[str, Any]) -> dict[str, Any] | None:
     """Write the worst case of the first output as a scenario, and say what it is."""
-    worst = account["outputs"][0]["worst"]
+    worst = report["outputs"][0]["worst"]
     if worst is None:
         (target / case_store.WORST).unlink(missing_ok=True)
         return None
@@ -218,7 +218,7 @@ def _write_worst(target: Path, chosen: Study, builder: Builder, account: dict[st
     said = ", ".join(f"{name} = {value}" for name, value in worst["axes"].items())
     scenario = builder.scenario(worst["axes"])
     head = (
-        f"Worst case of the study {account['name']}: point {worst['point']}, {said}.\n"
+        f"Worst case of the study {report['name']}: point {worst['point']}, {said}.\n"
         f"There {output.name} is {worst['value']!r} {output.unit}; run it again: rollover run {case_store.WORST}"
     )
     if chosen.simulator == "drop":

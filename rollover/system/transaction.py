@@ -1,4 +1,4 @@
-"""An update of files in several places (baselines, and the account of what changed in them): all of it or nothing.
+"""An update of files in several places (baselines, and the report of what changed in them): all of it or nothing.
 
 Everything is written beside its place first. Then a journal in each folder of baselines says what goes where, and from
 there on the update holds: whoever starts next finishes it, if its process is killed before its end.

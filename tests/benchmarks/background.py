@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from rollover.diagnosis import account, conclusion, diagnose
+from rollover.diagnosis import conclusion, diagnose, json_of
 from rollover.diagnosis.alone import fit_single_effect
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.io import recordings_in
@@ -67,7 +67,7 @@ def diagnosed(case: Case, ways: Sequence[str]) -> Iterator[dict[str, Any]]:
     with Executor(1) as executor:
         for way in ways:
             began = time.process_time()
-            said = account(diagnose(scenario, recordings, executor=executor, **WAYS[way]))
+            said = json_of(diagnose(scenario, recordings, executor=executor, **WAYS[way]))
             yield counted(case, said) | {"way": way, "cpu": time.process_time() - began}
 
 

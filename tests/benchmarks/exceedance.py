@@ -71,13 +71,13 @@ def by_study(folder: Path, workers: int, cases: int) -> tuple[dict[str, Any], fl
     return answers(study, done), float(as_numbers(told["cpu_time"]).sum())
 
 
-def report(account: dict[str, Any], brute: Sequence[tuple[float, bool, float]]) -> str:
+def report(report: dict[str, Any], brute: Sequence[tuple[float, bool, float]]) -> str:
     """Both side by side, and how likely a difference of that size is if there is none."""
-    force, rest = (next(o for o in account["outputs"] if o["name"] == n) for n in ("rops/force", "start/from_rest"))
+    force, rest = (next(o for o in report["outputs"] if o["name"] == n) for n in ("rops/force", "start/from_rest"))
     y = np.array([b[0] for b in brute])
     good = y[np.isfinite(y)]
     lines = [
-        f"study: {account['cases']}; brute force: {len(good)} of {len(y)} done",
+        f"study: {report['cases']}; brute force: {len(good)} of {len(y)} done",
     ]
     for name, e, hits in (
         ("rops/force above 25 kN", force["exceedance"], int((good > LIMIT).sum())),
@@ -101,10 +101,10 @@ def main() -> None:
     given = [int(v) for v in sys.argv[1:]]
     runs, workers, cases = (*given, *(1000, 2, 256)[len(given) :])
     with tempfile.TemporaryDirectory() as folder:
-        account, spent = by_study(Path(folder), workers, cases)
+        report, spent = by_study(Path(folder), workers, cases)
     with ProcessPoolExecutor(workers) as pool:
         brute = list(pool.map(peak, drawn(runs), chunksize=5))
-    print(report(account, brute))
+    print(report(report, brute))
     print(f"CPU: study {spent:.0f} s, brute force {sum(b[2] for b in brute):.0f} s")
 
 

@@ -194,9 +194,9 @@ def main() -> None:
         given.cases, given.seed, kinds=given.kinds, background=behind, workers=0,
         diagnosis="tests.benchmarks.plain_bic:by_bic",
     )  # fmt: skip
-    print("\n".join(sentences(proof.account["summary"])))
+    print("\n".join(sentences(proof.report["summary"])))
     if given.out is not None:
-        given.out.write_text(json.dumps(proof.account, indent=1), encoding="utf-8")
+        given.out.write_text(json.dumps(proof.report, indent=1), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -145,8 +145,8 @@ def rows(count: int, folder: Path) -> dict[str, float]:
     step("read", lambda: [case_store.stored(folder, row.key) for row in full])
     step("table", lambda: case_store.compact(folder, study, done.keys, done.points.columns, full))
     again = Conducted(points=done.points, keys=done.keys, rows=full, ran=count)
-    account = step("answers", lambda: answers(study, again))
-    found["page"] = _page(study, again, account, folder, count)
+    report = step("answers", lambda: answers(study, again))
+    found["page"] = _page(study, again, report, folder, count)
     cases = folder / case_store.CASES
     found["disk"] = sum(p.stat().st_blocks * 512 for p in cases.rglob("*.parquet")) / count
     found["table bytes"] = (folder / case_store.TABLE).stat().st_size / count
@@ -161,11 +161,11 @@ def _filled(measures: Mapping[str, float]) -> dict[str, float]:
     return {**measures, **more} if measures else {}
 
 
-def _page(study: Any, done: Conducted, account: dict[str, Any], folder: Path, count: int) -> float:
-    from tests.viz.test_study_page import account as headed
+def _page(study: Any, done: Conducted, report: dict[str, Any], folder: Path, count: int) -> float:
+    from tests.viz.test_study_page import json_of as headed
     from viz.pages.study import page
 
-    whole = {**headed(study, done), **account}
+    whole = {**headed(study, done), **report}
     began = time.process_time()
     text = page(study, done, whole, command="rollover study")
     spent = 1e3 * (time.process_time() - began) / count

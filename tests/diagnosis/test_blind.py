@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from rollover.diagnosis import Diagnosis, diagnose
-from rollover.diagnosis.io import account
+from rollover.diagnosis.io import json_of
 from rollover.proof.generator import Case, Order, make
 from rollover.proof.score import score
 from rollover.scenario import load
@@ -19,7 +19,7 @@ def diagnosed(order: Order, tmp_path: Any) -> tuple[Case, Diagnosis, dict[str, A
     path.write_text(case.scenario, encoding="utf-8")
     recordings = [(f"r{k}", r) for k, r in enumerate(case.recordings, start=1)]
     found = diagnose(load(path), recordings)
-    return case, found, score(case.truth, account(found))
+    return case, found, score(case.truth, json_of(found))
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("null", 410), ("decoy", 411)])

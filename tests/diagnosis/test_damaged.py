@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.diagnosis import account, diagnose, power
+from rollover.diagnosis import diagnose, json_of, power
 from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
 
@@ -86,7 +86,7 @@ def test_damaged_recordings_of_the_scenario_name_no_effect(damaged: Callable[[Re
         assert found.verdict == "cannot-tell", found.sentence
     assert ("nothing can be said of the ground" in found.sentence) == (damaged is before_contact)
     assert any("is constant" in note for note in found.notes) == (damaged is flat)
-    assert account(found)["verdict"] == found.verdict
+    assert json_of(found)["verdict"] == found.verdict
     assert found.sentence
 
 

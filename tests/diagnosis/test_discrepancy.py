@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from rollover.diagnosis import account, diagnose
+from rollover.diagnosis import diagnose, json_of
 from rollover.diagnosis.alone import repeats_its_course
 from rollover.diagnosis.data.dataset import Dataset, dataset_of, left_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
@@ -185,7 +185,7 @@ def test_a_slow_wave_alone_is_usual_model_error() -> None:
     found = diagnose(scenario(), bent(0.012), estimate=True)
     assert (found.verdict, found.answer, found.effects, found.broken) == ("no-mismatch", "nothing", (), ())
     assert "models usually miss" in found.sentence
-    scale = account(found)["discrepancy"][FORCE]
+    scale = json_of(found)["discrepancy"][FORCE]
     assert scale["unit"] == "N"
     assert 10.0 < scale["scale"] < 150.0  # of a range of 3 kN
     assert 0.01 < scale["correlation_time"] < 0.2

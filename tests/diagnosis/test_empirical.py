@@ -10,7 +10,7 @@ import pytest
 import rollover.diagnosis.pipeline  # noqa: F401  (the module, behind the function of its name)
 from ground.empirical import TERMS, shape
 from ground.law import REFERENCE_AREA
-from rollover.diagnosis import account, diagnose, diagnosed_text
+from rollover.diagnosis import diagnose, diagnosed_text, json_of
 from rollover.diagnosis.data.dataset import dataset_of, left_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.time_shift import align
@@ -180,7 +180,7 @@ def test_unlisted_physics_is_given_as_a_law_that_predicts(
     assert law.held_out_gain > 2.0 * law.standard_error
     assert law.after < 0.5 * law.before
     assert any("speed" in t.depends_on for t in law.terms)
-    answer = account(found)
+    answer = json_of(found)
     assert answer["empirical"]["law"] == law.law
     assert len(answer["empirical"]["terms"]) == len(law.terms) <= 3
     again = diagnosed_scenario(scenario(), found)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from rollover.diagnosis import account, diagnose
+from rollover.diagnosis import diagnose, json_of
 from rollover.diagnosis.io import diagnosed_scenario
 from tests.diagnosis.drops import recorded, scenario
 
@@ -21,7 +21,7 @@ def test_time_shifts_that_explain_all_are_a_sensor_fault() -> None:
     assert offset.value == pytest.approx(0.019, abs=7e-4)
     assert found.after["held_out"].nrmse < 1.2 < 5.0 < found.before["held_out"].nrmse
     assert "ms late" in found.sentence
-    told = account(found)
+    told = json_of(found)
     assert told["invariants"]["broken"] == []
     assert {e["answer"] for e in told["effects"]} == {"whole"}
     # what is switched on comes as late as what was recorded

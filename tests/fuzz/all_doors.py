@@ -141,7 +141,7 @@ def results(folder: Path) -> list[Door]:
             touched=(*side, *rec),
         ),
     ]
-    account = [
+    report = [
         Seed(
             name="regress",
             files={f"out/{k.partition('/')[2]}": v for k, v in taken("account", but=()).items()},
@@ -173,7 +173,7 @@ def results(folder: Path) -> list[Door]:
         Door(name="view", seeds=view, weight=0.02),
         Door(name="study results", seeds=study, weight=0.1),
         Door(name="diagnosis", seeds=diagnosis, weight=0.12),
-        Door(name="account", seeds=account, weight=0.03),
+        Door(name="account", seeds=report, weight=0.03),
     ]
 
 

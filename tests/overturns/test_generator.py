@@ -204,6 +204,6 @@ def test_overturns_are_sealed_handed_over_and_scored_like_drops() -> None:
     proof = runner.prove(
         1, 6, rig="overturn", kinds=["null"], workers=0, diagnosis="tests.proof.diagnoses:says_nothing"
     )
-    assert proof.account["rig"] == "overturn"
+    assert proof.report["rig"] == "overturn"
     assert proof.truths[0]["rig"] == "overturn"
-    assert proof.account["summary"]["false_alarms"]["hits"] == 0
+    assert proof.report["summary"]["false_alarms"]["hits"] == 0

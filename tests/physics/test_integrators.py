@@ -239,7 +239,7 @@ def test_the_key_at_its_default_changes_no_hash() -> None:
 
 def test_results_say_which_integrator_made_them() -> None:
     engine, loop = both(short("drop_test", **{"simulation.duration": 0.02}))
-    assert [results.account(run, [])["integrator"] for run in (engine, loop)] == ["exudyn", "compiled"]
+    assert [results.json_of(run, [])["integrator"] for run in (engine, loop)] == ["exudyn", "compiled"]
 
 
 def test_a_study_is_the_same_whatever_the_number_of_workers(tmp_path: Path) -> None:

@@ -31,8 +31,8 @@ def test_the_hash_comes_before_the_first_diagnosis() -> None:
         show=lambda done, of: order.append(f"{done}/{of}"),
     )
     assert order == [proof.seal.digest, "1/2", "2/2"]
-    assert proof.account["summary"]["false_alarms"]["hits"] == 0
-    assert proof.account["summary"]["p_values"]["of"] == 2
+    assert proof.report["summary"]["false_alarms"]["hits"] == 0
+    assert proof.report["summary"]["p_values"]["of"] == 2
     assert len(proof.diagnoses) == 2
 
 
@@ -50,9 +50,9 @@ def test_answers_go_to_their_own_cases(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_in_processes_of_their_own() -> None:
     kinds, found = ["null", "single"], BY_HAND + "always_damping"
     proof = prove(2, 8, kinds=kinds, effects=["soil-viscous-damping"], workers=1, diagnosis=found)
-    summary = proof.account["summary"]
+    summary = proof.report["summary"]
     assert (summary["false_alarms"]["hits"], summary["named_first"]["hits"]) == (1, 1)
-    assert [row["case"] for row in proof.account["rows"]] == ["case-0001", "case-0002"]
+    assert [row["case"] for row in proof.report["rows"]] == ["case-0001", "case-0002"]
 
 
 def test_a_diagnosis_that_changes_its_recordings_is_no_proof() -> None:
@@ -65,9 +65,9 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "proof"
     answer = CliRunner().invoke(app, ["prove", *QUICK, "--out", str(out), "--json"])
     assert answer.exit_code == 0, answer.output
-    account = json.loads(answer.stdout)
-    assert account["seal"]["digest"] in answer.stderr
-    assert account == json.loads((out / "prove.json").read_text())
+    report = json.loads(answer.stdout)
+    assert report["seal"]["digest"] in answer.stderr
+    assert report == json.loads((out / "prove.json").read_text())
     assert sorted(p.name for p in out.iterdir()) == [
         "diagnoses.jsonl",
         "prove.json",
@@ -75,7 +75,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "seal.json",
         "truth.json",
     ]
-    assert len(opened(account["seal"]["digest"], out / "truth.json")) == 2
+    assert len(opened(report["seal"]["digest"], out / "truth.json")) == 2
     assert len((out / "diagnoses.jsonl").read_text().splitlines()) == 2
     other = CliRunner().invoke(app, ["prove", *QUICK, "--seed", "2", "--out", str(out)])
     assert other.exit_code == 2
@@ -89,10 +89,10 @@ def test_a_background_is_asked_for_reported_and_recorded(tmp_path: Path, monkeyp
     answer = CliRunner().invoke(app, [*asked, "--background", "0.03"])
     assert answer.exit_code == 0, answer.output
     assert "a background alone named as an effect" in answer.output
-    account = json.loads((out / "prove.json").read_text())
-    assert account["background"] == 0.03
-    assert account["summary"]["real"]["background_alone"]["false_name"]["of"] == 1
-    (truth,) = opened(account["seal"]["digest"], out / "truth.json")
+    report = json.loads((out / "prove.json").read_text())
+    assert report["background"] == 0.03
+    assert report["summary"]["real"]["background_alone"]["false_name"]["of"] == 1
+    (truth,) = opened(report["seal"]["digest"], out / "truth.json")
     assert truth["background"]["share"] == 0.03
     assert "--kinds background --background 0.03" in (out / "report.html").read_text()
     other = CliRunner().invoke(app, [*asked, "--background", "drawn"])
@@ -109,8 +109,8 @@ def test_diagnoses_that_fail_are_listed(tmp_path: Path, monkeypatch: pytest.Monk
     answer = CliRunner().invoke(app, ["prove", *QUICK, "--out", str(tmp_path / "proof")])
     assert answer.exit_code == 3
     assert "RuntimeError: no idea" in answer.stderr
-    account = json.loads((tmp_path / "proof" / "prove.json").read_text())
-    assert account["summary"]["failed"] == ["case-0001", "case-0002"]
+    report = json.loads((tmp_path / "proof" / "prove.json").read_text())
+    assert report["summary"]["failed"] == ["case-0001", "case-0002"]
 
 
 def test_an_effect_that_does_not_exist(tmp_path: Path) -> None:

@@ -113,10 +113,10 @@ def study(data: Path, name: str, *, workers: int = 1) -> dict[str, Any]:
                 words += ["--workers", str(workers)]
             subprocess.run([Path(sys.executable).with_name("rollover"), *words], check=True, stdout=subprocess.DEVNULL)
         found = json.loads(Path(out, FINAL, "diagnosis.json").read_text(encoding="utf-8"))
-    return account(one, found)
+    return json_of(one, found)
 
 
-def account(one: Set, found: Mapping[str, Any]) -> dict[str, Any]:
+def json_of(one: Set, found: Mapping[str, Any]) -> dict[str, Any]:
     """Numbers of a diagnosis that are worth keeping."""
 
     def score(which: str) -> dict[str, float | None]:

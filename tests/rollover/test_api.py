@@ -18,11 +18,11 @@ from typer.testing import CliRunner
 import rollover as ro
 from rollover.assessment import standing
 from rollover.assessment.results import plain
-from rollover.calibration import account as calibrated
 from rollover.calibration import identification
+from rollover.calibration import json_of as calibrated
 from rollover.cli.main import app
 from rollover.comparison import compared
-from rollover.diagnosis import account as diagnosed
+from rollover.diagnosis import json_of as diagnosed
 from rollover.recording import write_parquet
 
 HEAVY = (
@@ -61,16 +61,16 @@ def read_json(path: Path) -> Any:
     return json.loads(path.read_text())
 
 
-def said(account: object) -> Any:
+def said(report: object) -> Any:
     """An account as its file has it."""
-    return json.loads(json.dumps(plain(account)))
+    return json.loads(json.dumps(plain(report)))
 
 
-def without(account: Any, *keys: str) -> Any:
+def without(report: Any, *keys: str) -> Any:
     """What does not depend on the clock, nor on where it is written."""
-    if isinstance(account, dict):
-        return {k: without(v, *keys) for k, v in account.items() if k not in keys}
-    return [without(v, *keys) for v in account] if isinstance(account, list) else account
+    if isinstance(report, dict):
+        return {k: without(v, *keys) for k, v in report.items() if k not in keys}
+    return [without(v, *keys) for v in report] if isinstance(report, list) else report
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +123,7 @@ def test_run(tmp_path: Path) -> None:
     cli("run", "drop_test", "--out", tmp_path / "run")
     done = ro.run("drop_test")
     clock = ("wall_time", "files", "origin")
-    assert without(said(done.account), *clock) == without(read_json(tmp_path / "run" / "run.json"), *clock)
+    assert without(said(done.as_dict), *clock) == without(read_json(tmp_path / "run" / "run.json"), *clock)
     write_parquet(done.recording, tmp_path / "own.parquet")
     assert (tmp_path / "own.parquet").read_bytes() == (tmp_path / "run" / "channels.parquet").read_bytes()
     again = ro.read(tmp_path / "run")
@@ -157,7 +157,7 @@ def test_synthesize(drops: Path) -> None:
 def test_compare(drops: Path, tmp_path: Path) -> None:
     cli("compare", "drop_test", drops, "--out", tmp_path / "compare")
     found = ro.compare("drop_test", drops)
-    told = said(compared.account(found))
+    told = said(compared.json_of(found))
     assert told["comparisons"] == read_json(tmp_path / "compare" / "compare.json")["comparisons"]
     assert [c["recording"] for c in told["comparisons"]] == ["d0", "d1"]
     one = found["d1"].channels[0]
@@ -171,7 +171,7 @@ def test_calibrate(drops: Path, tmp_path: Path) -> None:
     cli("calibrate", "drop_test", drops, "--fit", FIT, *few, "--out", tmp_path / "fit")
     found = ro.calibrate("drop_test", drops, FIT, hold_out="d1", starts=1)
     written = read_json(tmp_path / "fit" / "calibrate.json")
-    told = said(calibrated.account(found))
+    told = said(calibrated.json_of(found))
     assert told == {key: written[key] for key in told}
     assert found.calibrated.vehicle.mass == found.override[FIT] == pytest.approx(140.0, rel=0.02)
 
@@ -179,7 +179,7 @@ def test_calibrate(drops: Path, tmp_path: Path) -> None:
 def test_identify(drops: Path, tmp_path: Path) -> None:
     cli("identify", drops, "--out", tmp_path / "soil")
     found = ro.identify(drops)
-    assert said(identification.account(found)) == read_json(tmp_path / "soil" / "identify.json")
+    assert said(identification.json_of(found)) == read_json(tmp_path / "soil" / "identify.json")
     assert found.soil == (tmp_path / "soil" / "soil.yaml").read_text(encoding="utf-8")
 
 
@@ -209,7 +209,7 @@ def test_stability(tmp_path: Path) -> None:
     cli("stability", "utility_tractor", "--headings", 1, "--out", tmp_path / "slopes")
     found = ro.stability("utility_tractor", headings=1)
     written = read_json(tmp_path / "slopes" / "stability.json")
-    told = said(standing.account(found))
+    told = said(standing.json_of(found))
     assert told == {key: written[key] for key in told}
     assert np.degrees(found.least.balance) == written["least"]["balance_deg"]
 

@@ -14,7 +14,7 @@ from typer.testing import CliRunner, Result
 
 from rollover.cli.commands.diagnose import tolerances
 from rollover.cli.main import app
-from rollover.diagnosis import Diagnosis, account
+from rollover.diagnosis import Diagnosis, json_of
 from rollover.diagnosis.overlay import series
 from rollover.diagnosis.result import Estimate
 from rollover.dynamics.drop_test import DropModel
@@ -122,7 +122,7 @@ def assert_contract(answer: Mapping[str, Any]) -> None:
 
 def test_a_sensor_s_channel_stands_beside_its_numbers() -> None:
     found: Diagnosis = sensor_at_fault()
-    answer = account(found)
+    answer = json_of(found)
     assert_contract(answer)
     assert answer["effects"][0]["channel"] == "ground/force_normal"
     assert set(answer["effects"][0]["parameters"]) == {"gain"}

@@ -114,11 +114,11 @@ def test_killed_a_hundred_times_while_it_writes(tmp_path: Path) -> None:
 # ---- baselines
 
 
-def update(folder: Path, out: Path, texts: dict[str, str], account: str) -> None:
+def update(folder: Path, out: Path, texts: dict[str, str], report: str) -> None:
     from rollover.system.transaction import update as updating
 
     with updating(out, {folder / name: text for name, text in texts.items()}) as part:
-        (part / "regress.json").write_text(account)
+        (part / "regress.json").write_text(report)
 
 
 @pytest.mark.parametrize("name", ["replace", "rename"])

@@ -136,13 +136,13 @@ def test_a_study_has_a_column_and_a_warning(tmp_path: Path) -> None:
     rows[12] = replace(rows[12], measures={**rows[12].measures, "ledger/residual": 0.031})
     done = replace(done, rows=rows)
     head = {"title": "made up", "name": "x", "scenario_hash": "", "versions": {}, "reliability": None, "worst": None}
-    account = {**head, **answers(study, done), "ran": 40}
-    assert account["ledger"] == {"largest_residual": 0.031, "at_point": 12, "limit": 0.005, "open": 1}
-    page = study_page(study, done, account, command="rollover study x")
+    report = {**head, **answers(study, done), "ran": 40}
+    assert report["ledger"] == {"largest_residual": 0.031, "at_point": 12, "limit": 0.005, "open": 1}
+    page = study_page(study, done, report, command="rollover study x")
     assert "ledger open by, %" in page
     said = "energy ledger does not close in 1 cases: up to 3.1 % of the energy released"
     assert said in page
-    assert any(said in line for line in sentences(account))
+    assert any(said in line for line in sentences(report))
 
 
 def test_a_regression_notes_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

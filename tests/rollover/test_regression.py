@@ -240,7 +240,7 @@ def test_the_advised_command_works_as_printed(folder: Path) -> None:
     (advised,) = re.findall(r"`rollover (.*?--reason) TEXT` makes one", first.stdout)
     done = runner.invoke(app, [*shlex.split(advised), "a first one", "--workers", "0"])
     assert done.exit_code == 0, done.stderr
-    assert "replaces the account of corner, drop, my new" in done.stderr
+    assert "replaces the report of corner, drop, my new" in done.stderr
     assert "`rollover regress '../my new.yaml'`" in (folder / "baselines" / "my new.yaml").read_text()
     assert regress(folder).exit_code == 0
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from rollover.assessment.frame_account import scenario_of
+from rollover.assessment.frame_json import scenario_of
 from rollover.assessment.frame_test import frame_test
 from rollover.cli.main import app
 

@@ -255,7 +255,7 @@ def test_results_of_an_edited_scenario_are_ones_own(tmp_path: Path) -> None:
     results.write_json(folder / "a.json", {"format": "f/1", **about})
 
     def claimed(**changes: Any) -> Path:
-        return results.claim_account(folder, "f/1", {**about, **changes}, ["a.json"], say=said.append)
+        return results.claim_report(folder, "f/1", {**about, **changes}, ["a.json"], say=said.append)
 
     assert claimed() == folder.resolve()
     assert said == []

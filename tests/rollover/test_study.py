@@ -360,8 +360,8 @@ def test_the_worst_case_repeats(tmp_path: Path) -> None:
     path = drops(tmp_path, ("simulator: drop\n", ""), ("count: 20", "count: 3"))
     answer = runner.invoke(app, ["study", str(path), "--out", str(out), "--workers", "0", "--json"])
     assert answer.exit_code == 0, answer.stderr
-    account = json.loads(answer.stdout)
-    worst = account["worst"]
+    report = json.loads(answer.stdout)
+    worst = report["worst"]
     table, _ = read_table(out / case_store.TABLE)
     peaks = table["ground/force_normal"]
     assert worst["point"] == int(np.argmax(peaks))

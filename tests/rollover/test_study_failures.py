@@ -61,8 +61,8 @@ def told(study: Any, conducted: Conducted) -> tuple[dict[str, Any], str]:
         "scenario_hash": document.content_hash(study.scenario),
         "versions": results.versions(),
     }
-    account = {**head, **answers(study, conducted), "reliability": None, "worst": None, "ran": 0}
-    plain: dict[str, Any] = results.plain(account)
+    report = {**head, **answers(study, conducted), "reliability": None, "worst": None, "ran": 0}
+    plain: dict[str, Any] = results.plain(report)
     return plain, page(study, conducted, plain, command="rollover study x")
 
 
@@ -74,8 +74,8 @@ def grid(tmp_path: Path) -> Any:
 def test_failures_at_an_axis_end_bound_the_probability(tmp_path: Path) -> None:
     study = studies.load(drops(tmp_path, ("count: 20", "count: 24")))
     conducted = done(study, lambda values: values["speed"] > 2.5)
-    account, html = told(study, conducted)
-    rows = {row["axis"]: row for row in account["failures_along"]}
+    report, html = told(study, conducted)
+    rows = {row["axis"]: row for row in report["failures_along"]}
     speed = conducted.points.columns["speed"]
     failed = np.array([row.status == "failed" for row in conducted.rows])
     assert rows["speed"]["p"] == pytest.approx(2 * mannwhitneyu(speed[failed], speed[~failed]).pvalue)
@@ -83,8 +83,8 @@ def test_failures_at_an_axis_end_bound_the_probability(tmp_path: Path) -> None:
     assert rows["speed"]["more"] == "high"
     assert not rows["soil"]["differs"]
     assert "not at random" in Parts(html).said
-    assert "at high speed" in "\n".join(sentences(account))
-    found = account["outputs"][0]["exceedance"]
+    assert "at high speed" in "\n".join(sentences(report))
+    found = report["outputs"][0]["exceedance"]
     assert found["least"] == pytest.approx(found["hits"] / 24)
     assert found["most"] == pytest.approx((found["hits"] + failed.sum()) / 24)
     for share in (found["least"], found["most"]):
@@ -106,12 +106,12 @@ def test_clustered_failures_are_no_chance_scattered_ones_are() -> None:
 
 def test_a_grid_has_a_map_but_no_quantiles_or_probability(tmp_path: Path) -> None:
     study = grid(tmp_path)
-    account, html = told(study, done(study, lambda values: values["slope"] > 55.0 and values["speed"] > 2.5))
-    said = Parts(html).said + "\n".join(sentences(account))
+    report, html = told(study, done(study, lambda values: values["slope"] > 55.0 and values["speed"] > 2.5))
+    said = Parts(html).said + "\n".join(sentences(report))
     for word in ("quantile", "probability", "odds", "share of cases below"):
         assert word not in said.lower()
-    assert account["outputs"][0]["quantiles"] == []
-    assert account["outputs"][0]["exceedance"] is None
+    assert report["outputs"][0]["quantiles"] == []
+    assert report["outputs"][0]["exceedance"] is None
     assert "over both axes" in said
     for label in ("slope, deg", "speed, m/s"):
         assert label in html

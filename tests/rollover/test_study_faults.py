@@ -111,10 +111,10 @@ def test_killed_three_times_it_ends_with_the_same_table(sixty: tuple[Path, Path]
         assert {name: now[name] for name in seen} == seen, "a case that was there was run again"
         seen = now
     assert len(seen) < 60
-    account = finished(begun(study, out, "--json"))
-    assert account["ran"] == 60 - len(seen)
+    report = finished(begun(study, out, "--json"))
+    assert report["ran"] == 60 - len(seen)
     assert {name: files(out)[name] for name in seen} == seen
     assert read_table(out / case_store.TABLE) == read_table(reference / case_store.TABLE)
     assert (out / case_store.TABLE).read_bytes() == (reference / case_store.TABLE).read_bytes()
-    assert account["cases"] == {"all": 60, "done": 56, "failed": 4}
+    assert report["cases"] == {"all": 60, "done": 56, "failed": 4}
     assert conduct(studies.load(study), out, Way(workers=0)).ran == 0

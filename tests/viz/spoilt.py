@@ -6,9 +6,9 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
-from rollover.assessment import frame_account
+from rollover.assessment import frame_json
 from rollover.assessment.frame_test import frame_test
-from rollover.assessment.rolled import account, rolled
+from rollover.assessment.rolled import json_of, rolled
 from rollover.assessment.standing import scenario_of
 from rollover.diagnosis.planning.next_test import Advice, NextTest
 from rollover.diagnosis.planning.plan import Detectable, Pair, Plan
@@ -65,13 +65,13 @@ def _plan(text: str) -> str:
 
 def _rolling(text: str) -> str:
     asked, found = rolled(scenario_of("vineyard_tractor"))
-    answer = everywhere(account(asked, found, {"scenario_hash": text, "outside": [text]}), text)
+    answer = everywhere(json_of(asked, found, {"scenario_hash": text, "outside": [text]}), text)
     return rolling_page.page({**answer, "outside": [text], "versions": {text: text}}, command=text)
 
 
 @functools.cache
 def _pushed() -> dict[str, Any]:
-    return frame_account.account(frame_test(frame_account.scenario_of("two_post_rear_tubes_3t", 3000.0), segments=4))
+    return frame_json.json_of(frame_test(frame_json.scenario_of("two_post_rear_tubes_3t", 3000.0), segments=4))
 
 
 def _rops(text: str) -> str:

@@ -28,7 +28,7 @@ from tests.viz import example, spoilt
 from tests.viz.browser import CHROMIUM, has_browser
 from tests.viz.html import Parts
 from tests.viz.test_proof_page import row
-from tests.viz.test_study_page import account as made_account
+from tests.viz.test_study_page import json_of as made_account
 from viz import pages
 from viz.content.blocks import Cases, Details, Figure, Footer, Headline, Note, Pairs, Section, Table
 from viz.content.embedded import embedded, in_script, policy
@@ -127,8 +127,8 @@ def page_of(kind: str, folder: Path) -> str:
     if kind in ("prove", "score"):
         rows = [row(HOSTILE, "single", "mass", "mass"), row("case-0002", "null", "", HOSTILE)]
         whose = {"seed": 7} if kind == "prove" else {"by": HOSTILE}
-        account = {**whose, "summary": tally(rows), "rows": rows, "seal": {"digest": HOSTILE, "algorithm": HOSTILE}}
-        return proof.page(account, command=HOSTILE, versions={HOSTILE: HOSTILE})
+        proved = {**whose, "summary": tally(rows), "rows": rows, "seal": {"digest": HOSTILE, "algorithm": HOSTILE}}
+        return proof.page(proved, command=HOSTILE, versions={HOSTILE: HOSTILE})
     if kind == "regress":
         answer_ = Answer(scenario=HOSTILE, verdict="failed", sentence=HOSTILE, notes=(HOSTILE,))
         return regression.page([answer_], command=HOSTILE, scenario_hash=HOSTILE)

@@ -59,8 +59,8 @@ def page_of(kind: str, folder: Path) -> str:
         )
     if kind == "prove":
         rows = [row("case-0001", "single", "mass", "mass"), row("case-0002", "null", "", "soil-layer")]
-        account = {"seed": 7, "summary": tally(rows), "rows": rows, "seal": {"digest": HASH, "algorithm": "sha256"}}
-        return proof.page(account, command="rollover prove --cases 2", versions=VERSIONS)
+        proved = {"seed": 7, "summary": tally(rows), "rows": rows, "seal": {"digest": HASH, "algorithm": "sha256"}}
+        return proof.page(proved, command="rollover prove --cases 2", versions=VERSIONS)
     if kind == "study":
         return written(folder, 24).read_text(encoding="utf-8")
     load = Difference(

@@ -45,7 +45,7 @@ def row(case: str, kind: str, truth: str, claimed: str | None, **more: Any) -> d
 
 
 @pytest.fixture
-def account() -> dict[str, Any]:
+def json_of() -> dict[str, Any]:
     rows = [
         row("case-0001", "single", "mass", "mass"),
         row("case-0002", "single", "mass", "slope"),
@@ -60,20 +60,20 @@ def account() -> dict[str, Any]:
     return {"seed": 7, "summary": tally(rows), "rows": rows, "seal": seal}
 
 
-def made(account: dict[str, Any]) -> Parts:
-    return Parts(page(account, command="rollover prove --cases 6", versions={"rollover": "0.1.0"}))
+def made(report: dict[str, Any]) -> Parts:
+    return Parts(page(report, command="rollover prove --cases 6", versions={"rollover": "0.1.0"}))
 
 
-def test_the_answer_comes_first_and_false_alarms_with_it(account: dict[str, Any]) -> None:
-    said = made(account).said
+def test_the_answer_comes_first_and_false_alarms_with_it(report: dict[str, Any]) -> None:
+    said = made(report).said
     assert "2 of 3 single effects were detected, 1 of them named alone and right;" in said
     assert "1 of 2 cases without an effect were false alarms." in said
     assert "1 diagnosis failed; with 2 such cases the rate of false alarms is at most 99 %." in said
-    assert 'class="headline fail"' in made(account).text
+    assert 'class="headline fail"' in made(report).text
 
 
-def test_every_case_that_went_wrong_is_listed_with_its_reason(account: dict[str, Any]) -> None:
-    found = made(account)
+def test_every_case_that_went_wrong_is_listed_with_its_reason(report: dict[str, Any]) -> None:
+    found = made(report)
     assert ["case-0003", "single", "tyre-damping", "ValueError: <b>no</b> idea"] in found.rows
     assert ["case-0002", "single", "mass", "missing-physics", "slope", "50"] in found.rows
     assert ["case-0005", "null", "", "missing-physics", "soil-layer", "50"] in found.rows
@@ -81,8 +81,8 @@ def test_every_case_that_went_wrong_is_listed_with_its_reason(account: dict[str,
     assert listed == {"case-0002", "case-0003", "case-0005"}
 
 
-def test_confusion_groups_and_seal_stand_there(account: dict[str, Any]) -> None:
-    found = made(account)
+def test_confusion_groups_and_seal_stand_there(report: dict[str, Any]) -> None:
+    found = made(report)
     assert ["mass", "1", "slope 1"] in found.rows
     assert ["outside:cubic", "1", ""] in found.rows, "called unexplained, it is right"
     assert ["20 to 100", "3", "2 of 3", "1 of 2", "1 of 2", "1 of 2", "2 %", "1 of 1"] in found.rows
@@ -91,9 +91,9 @@ def test_confusion_groups_and_seal_stand_there(account: dict[str, Any]) -> None:
     assert found.fetched() == []
 
 
-def test_groups_stand_in_the_order_of_their_numbers(account: dict[str, Any]) -> None:
-    rows = [dict(r, signal_to_noise=s) for r, s in zip(account["rows"], (600.0, 3.0, 30.0, 1, 1, 1), strict=True)]
-    found = made({**account, "rows": rows, "summary": tally(rows)})
+def test_groups_stand_in_the_order_of_their_numbers(report: dict[str, Any]) -> None:
+    rows = [dict(r, signal_to_noise=s) for r, s in zip(report["rows"], (600.0, 3.0, 30.0, 1, 1, 1), strict=True)]
+    found = made({**report, "rows": rows, "summary": tally(rows)})
     groups = [r[0] for r in found.rows if re.match(r"\d+ (to|and)", r[0])]
     assert groups[:3] == ["0 to 5", "20 to 100", "500 and more"]
 
@@ -119,9 +119,9 @@ def test_a_confusion_is_red_and_what_is_right_green() -> None:
     ]
 
 
-def test_reality_and_certainty_are_shown_where_there_is_any(account: dict[str, Any]) -> None:
-    assert "Foreign forms" not in made(account).said
-    assert "Probabilities over names" not in made(account).said
+def test_reality_and_certainty_are_shown_where_there_is_any(report: dict[str, Any]) -> None:
+    assert "Foreign forms" not in made(report).said
+    assert "Probabilities over names" not in made(report).said
     formed = {"form": "force-stays", "background": 0.03, "over_background": 2.0, "grades": ["part"]}
     given = {"flaw": "", "truth": "soil-crust", "brier": 0.08, "log": 0.22, "pairs": [[0.8, True], [0.2, False]]}
     rows = [
@@ -129,7 +129,7 @@ def test_reality_and_certainty_are_shown_where_there_is_any(account: dict[str, A
         row("case-0002", "foreign-form", "soil-crust", "mass", **formed),
         row("case-0003", "background", "", "mass", background=0.03),
     ]
-    found = made({**account, "rows": rows, "summary": tally(rows)})
+    found = made({**report, "rows": rows, "summary": tally(rows)})
     assert ["soil-crust, force-stays", "2", "2", "1", "1", "1", "1", "50"] in found.rows
     assert ["part", "1", "1"] in found.rows
     assert "1 cases: Brier score 0.080, log score 0.220, slope 1.67." in found.said

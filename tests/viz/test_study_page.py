@@ -24,7 +24,7 @@ CASES = 240
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
-def account(study: Any, done: Any) -> dict[str, Any]:
+def json_of(study: Any, done: Any) -> dict[str, Any]:
     """What the command writes, but for the parts that need a folder."""
     head = {
         "title": study.title,
@@ -40,7 +40,7 @@ def account(study: Any, done: Any) -> dict[str, Any]:
 def written(folder: Path, cases: int) -> Path:
     study, done = made_up(folder, cases)
     path = folder / f"report-{cases}.html"
-    path.write_text(page(study, done, account(study, done), command="rollover study drops"), encoding="utf-8")
+    path.write_text(page(study, done, json_of(study, done), command="rollover study drops"), encoding="utf-8")
     return path
 
 
@@ -66,7 +66,7 @@ def test_what_it_says_without_a_script(report: Path) -> None:
 
 def test_a_plan_says_how_many_cases_pass_the_limit(tmp_path: Path) -> None:
     study, done = made_up(tmp_path, 40)
-    found = account(study, done)
+    found = json_of(study, done)
     limit = found["outputs"][0]["limit"]
     beyond = {"beyond": "above", "limit": limit, "hits": 11, "cases": 38, "failed": 2}
     found["outputs"][0] |= {"exceedance": None, "beyond_limit": beyond}

@@ -38,16 +38,16 @@ LINES = {"by_strength": "signal to noise", "by_noise": "noise, share of range", 
 KINDS = {"unexplained": "unexplained", "near": "a near name", "wrong": "a wrong name", "missed": "nothing"}
 
 
-def page(account: Mapping[str, Any], *, command: str, versions: Mapping[str, str]) -> str:
+def page(report: Mapping[str, Any], *, command: str, versions: Mapping[str, str]) -> str:
     """HTML of a proof from its prove.json, or of answers to sealed cases from their score.json."""
-    summary = account["summary"]
-    is_proof = "seed" in account
-    title = f"Blind proof of the diagnosis: {summary['cases']} concealed cases, seed {account.get('seed')}"
+    summary = report["summary"]
+    is_proof = "seed" in report
+    title = f"Blind proof of the diagnosis: {summary['cases']} concealed cases, seed {report.get('seed')}"
     if not is_proof:
-        title = f"Answers by {account['by'] or 'somebody'} to {summary['cases']} sealed cases"
+        title = f"Answers by {report['by'] or 'somebody'} to {summary['cases']} sealed cases"
     blocks = [*_answers(summary), *_false_alarms(summary), *_confusion(summary), *_groups(summary)]
-    blocks += [*sections(summary), *_values(summary), *_failures(account), *_seal(account)]
-    seal = account["seal"]["digest"]
+    blocks += [*sections(summary), *_values(summary), *_failures(report), *_seal(report)]
+    seal = report["seal"]["digest"]
     return render(
         title=title,
         subtitle="Cases made by an independent solver, sealed before the first "
@@ -196,15 +196,15 @@ def _values(summary: Mapping[str, Any]) -> list[Block]:
     return [Section(title="Values, held-out data, unlisted physics", blocks=blocks)] if blocks else []
 
 
-def _failures(account: Mapping[str, Any]) -> list[Block]:
+def _failures(report: Mapping[str, Any]) -> list[Block]:
     blocks: list[Block] = []
-    failed = [row for row in account["rows"] if row["failed"]]
+    failed = [row for row in report["rows"] if row["failed"]]
     if failed:
         rows: list[list[str | Cell]] = [
             [row["case"], row["kind"], _listed(row["truth"]), row["failure"]] for row in failed
         ]
         blocks.append(Table(columns=["failed", "kind", "truth", "why"], rows=rows))
-    wrong = [m for m in account["summary"]["misses"] if m["case"] not in account["summary"]["failed"]]
+    wrong = [m for m in report["summary"]["misses"] if m["case"] not in report["summary"]["failed"]]
     if wrong:
         cells: list[list[str | Cell]] = [
             [
@@ -222,10 +222,10 @@ def _failures(account: Mapping[str, Any]) -> list[Block]:
     return [Section(title="Every case that went wrong", blocks=blocks or [Note(text="None.")])]
 
 
-def _seal(account: Mapping[str, Any]) -> list[Block]:
-    rule = f"{account['seal']['algorithm']}: {account['seal']['digest']}."
+def _seal(report: Mapping[str, Any]) -> list[Block]:
+    rule = f"{report['seal']['algorithm']}: {report['seal']['digest']}."
     text = f"It was shown before the first diagnosis; truth.json beside this page has salt and truths. {rule}"
-    if "seed" not in account:
+    if "seed" not in report:
         text = f"It stands beside the cases; the truth that was read for this page has the salt. {rule}"
     return [Section(title="The seal", blocks=[Note(text=text)])]
 

@@ -14,7 +14,7 @@ COLUMNS = ("load", "filter", "unit", "was", "is", "change", "allowed", "at, s", 
 
 
 def page(answers: Sequence[Answer], *, command: str, scenario_hash: str = "") -> str:
-    """HTML of the full account; `scenario_hash` is one over all scenarios that were asked for."""
+    """HTML of the full report; `scenario_hash` is one over all scenarios that were asked for."""
     bad = [a for a in answers if not a.ok]
     updated = [a for a in answers if a.verdict == "updated"]
     if bad:

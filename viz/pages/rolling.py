@@ -26,7 +26,7 @@ BASIS = (
 
 
 def page(answer: Mapping[str, Any], *, command: str) -> str:
-    """HTML of the account that `rollover rolling` writes."""
+    """HTML of the report that `rollover rolling` writes."""
     goes_on = answer["verdict"] == "continuous"
     head = Headline(
         sentence=f"{answer['verdict'].capitalize()} rolling: {answer['sentence']}.",

@@ -30,7 +30,7 @@ MEMBERS = (
 
 
 def page(answer: Mapping[str, Any], *, command: str) -> str:
-    """HTML of the account that `rollover rops` writes."""
+    """HTML of the report that `rollover rops` writes."""
     done = [e for e in answer["tests"] if "curve" in e]
     found = findings(answer["tests"])
     bad = answer["verdict"] == "not met"

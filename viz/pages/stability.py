@@ -34,7 +34,7 @@ LOSSES = (
 
 
 def page(answer: Mapping[str, Any], *, command: str) -> str:
-    """HTML of the account that `rollover stability` writes."""
+    """HTML of the report that `rollover stability` writes."""
     rows, limit = answer["headings"], answer["code_6"]
     least = answer["least"]
     below = least["balance_deg"] < limit["limit_deg"]

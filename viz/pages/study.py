@@ -28,44 +28,44 @@ MOST_SENTENCES = 30
 COLUMNS_OF_FLAGS = ("flag", "cases", "share", "share at the peak load")
 
 
-def page(study: Study, done: Conducted, account: Mapping[str, Any], *, command: str) -> str:
-    """HTML of a study's account."""
+def page(study: Study, done: Conducted, report: Mapping[str, Any], *, command: str) -> str:
+    """HTML of a study's report."""
     blocks: list[Block] = differences_section(study.scenario)
-    if given := account.get("set"):
+    if given := report.get("set"):
         blocks.append(Note(text=f"Set for this study: {', '.join(given)}."))
-    for output in account["outputs"][:MOST_FIGURES]:
-        blocks.append(_output(study, done, account, output))
-    if rest := account["outputs"][MOST_FIGURES:]:
-        blocks.append(Section(title="Further outputs", blocks=[_quantiles(o, drawn=account["drawn"]) for o in rest]))
-    if account["reliability"]:
-        blocks.append(_reliability(account["reliability"]))
-    if account["worst"] is not None:
-        blocks.append(_worst(account["worst"]))
-    if said := failures.sentence(account["failures_along"]):
+    for output in report["outputs"][:MOST_FIGURES]:
+        blocks.append(_output(study, done, report, output))
+    if rest := report["outputs"][MOST_FIGURES:]:
+        blocks.append(Section(title="Further outputs", blocks=[_quantiles(o, drawn=report["drawn"]) for o in rest]))
+    if report["reliability"]:
+        blocks.append(_reliability(report["reliability"]))
+    if report["worst"] is not None:
+        blocks.append(_worst(report["worst"]))
+    if said := failures.sentence(report["failures_along"]):
         blocks.insert(0, Note(text=f"{said}.", warning=True))
-    if said := reference.sentence(account.get("reference_check")):
-        blocks.append(Note(text=f"Integrator: {account['integrator']}. {said}."))
-    if count := account["from_rest"]:
+    if said := reference.sentence(report.get("reference_check")):
+        blocks.append(Note(text=f"Integrator: {report['integrator']}. {said}."))
+    if count := report["from_rest"]:
         blocks.append(Note(text=f"{count} cases had no static balance on their surface and began from rest."))
-    if (ledger := account.get("ledger")) and ledger["open"]:
+    if (ledger := report.get("ledger")) and ledger["open"]:
         blocks.insert(0, Note(text=f"{of_cases(ledger)}.", warning=True))
-    blocks.append(_failures(account))
-    blocks.append(_flags(account))
+    blocks.append(_failures(report))
+    blocks.append(_flags(report))
     blocks.append(Section(title="Every case", blocks=[_cases(study, done)]))
     return render(
-        title=account["title"],
+        title=report["title"],
         subtitle="Load study",
-        headline=_headline(account),
+        headline=_headline(report),
         blocks=blocks,
-        footer=Footer(command=command, scenario_hash=account["scenario_hash"], versions=account["versions"]),
+        footer=Footer(command=command, scenario_hash=report["scenario_hash"], versions=report["versions"]),
     )
 
 
-def _headline(account: Mapping[str, Any]) -> Headline:
-    n, first = account["cases"], account["outputs"][0]
+def _headline(report: Mapping[str, Any]) -> Headline:
+    n, first = report["cases"], report["outputs"][0]
     unit, factor = series_unit(first["unit"])
     failed = f"{n['failed']} of {n['all']} cases failed. " if n["failed"] else f"{n['all']} cases. "
-    flags = {f["flag"] for f in account["flags"]}
+    flags = {f["flag"] for f in report["flags"]}
     state: Any = "warn" if n["failed"] or flags else ""
     worth = f" {_sentence(standing(flags))}" if flags else ""
     if not first["cases"]:
@@ -84,19 +84,19 @@ def _headline(account: Mapping[str, Any]) -> Headline:
             sentence += f", {b['beyond']} {b['limit'] * factor:.4g}{known} in {b['hits']} of {b['cases']} cases"
         sentence += "."
     return Headline(
-        sentence=sentence, detail=f"{failed}{_sentence(account['meaning_of_quantiles'])}{worth}", state=state
+        sentence=sentence, detail=f"{failed}{_sentence(report['meaning_of_quantiles'])}{worth}", state=state
     )
 
 
-def _output(study: Study, done: Conducted, account: Mapping[str, Any], output: Mapping[str, Any]) -> Section:
+def _output(study: Study, done: Conducted, report: Mapping[str, Any], output: Mapping[str, Any]) -> Section:
     unit, factor = series_unit(output["unit"])
     chosen = next(o for o in study.outputs if o.name == output["name"] and o.limit == output["limit"])
     y = values_of(chosen, done.rows) * factor
     label = f"{output['name']}, {unit}" if unit != "1" else output["name"]
     levels = [] if output["limit"] is None else [Level(name="limit", value=output["limit"] * factor)]
-    blocks: list[Block] = [_quantiles(output, drawn=account["drawn"])]
+    blocks: list[Block] = [_quantiles(output, drawn=report["drawn"])]
     if np.isfinite(y).any():
-        blocks.append(in_order(y, label, levels, drawn=account["drawn"]))
+        blocks.append(in_order(y, label, levels, drawn=report["drawn"]))
         if output["ends"]:
             blocks.append(_tornado(output, factor, label))
         blocks += _indices(output, factor, unit)
@@ -214,18 +214,18 @@ def _worst(worst: Mapping[str, Any]) -> Section:
     return Section(title="The worst case", blocks=[Note(text=text)])
 
 
-def _failures(account: Mapping[str, Any]) -> Section:
+def _failures(report: Mapping[str, Any]) -> Section:
     rows = [
         [f["failure"], str(f["cases"]), ", ".join(map(str, f["points"][:8])), f["sentence"]]
-        for f in account["failures"][:MOST_SENTENCES]
+        for f in report["failures"][:MOST_SENTENCES]
     ]
     if not rows:
         return Section(title="Failures", blocks=[Note(text="No case failed.")])
     columns = ("by", "cases", "points", "in words")
-    more = len(account["failures"]) - MOST_SENTENCES
+    more = len(report["failures"]) - MOST_SENTENCES
     caption = f"{more} further sentences stand in cases.parquet." if more > 0 else ""
     blocks: list[Block] = [Table(columns=columns, rows=rows, numeric=(1,), caption=caption)]
-    if tests := account["failures_along"]:
+    if tests := report["failures_along"]:
         cells = [
             [
                 t["axis"],
@@ -242,9 +242,9 @@ def _failures(account: Mapping[str, Any]) -> Section:
     return Section(title="Failures", blocks=blocks)
 
 
-def _flags(account: Mapping[str, Any]) -> Section:
-    rows = [[f["flag"], str(f["cases"]), _percent(f["share"]), _percent(f["share_at_peak"])] for f in account["flags"]]
-    known = all(f["flag"] != "uncalibrated" for f in account["flags"])
+def _flags(report: Mapping[str, Any]) -> Section:
+    rows = [[f["flag"], str(f["cases"]), _percent(f["share"]), _percent(f["share_at_peak"])] for f in report["flags"]]
+    known = all(f["flag"] != "uncalibrated" for f in report["flags"])
     title = "Outside the ground law's calibrated domain" if known else "The ground law is not calibrated"
     if not rows:
         return Section(title=title, blocks=[Note(text="No case carries a domain flag.")])

@@ -65,7 +65,7 @@ def calibrate(
 ) -> None:
     """Fit values of a scenario to recordings, with intervals, and say what the recordings cannot determine."""
     from rollover.assessment import results
-    from rollover.calibration.account import FORMAT, account, table
+    from rollover.calibration.io import FORMAT, json_of, table
     from rollover.calibration.posterior import installed
     from rollover.calibration.request import Request
     from rollover.cli import console
@@ -86,7 +86,7 @@ def calibrate(
     if posterior:
         installed()
     about["origin"] = results.origin(path, folder, set_ or [])
-    results.claim_account(folder, FORMAT, about, [JSON, OVERRIDE, SCENARIO, PAGE, DRAWS], force=force, say=console.say)
+    results.claim_report(folder, FORMAT, about, [JSON, OVERRIDE, SCENARIO, PAGE, DRAWS], force=force, say=console.say)
     found = request.calibrated(
         file=path,
         clock_sigma=clock_sigma,
@@ -96,7 +96,7 @@ def calibrate(
         workers=workers,
         posterior=draws if posterior else 0,
     )
-    answer = account(found, about)
+    answer = json_of(found, about)
     with results.whole(folder) as part:
         results.write_json(part / JSON, answer)
         if posterior:

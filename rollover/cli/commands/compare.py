@@ -78,7 +78,7 @@ def compare(
     """
     from rollover.assessment import results
     from rollover.cli import console
-    from rollover.comparison.compared import FORMAT, account, compared
+    from rollover.comparison.compared import FORMAT, compared, json_of
     from rollover.comparison.curves import curve_files, files_of, write_curves
     from rollover.comparison.recordings import read
     from rollover.comparison.run_pair import is_result
@@ -99,11 +99,11 @@ def compare(
     }
     about["origin"] = results.origin(path, folder, set_ or [])
     files = [JSON, PAGE, *pictures.values(), *curves.values()]
-    results.claim_account(folder, FORMAT, about, files, force=force, say=console.say)
+    results.claim_report(folder, FORMAT, about, files, force=force, say=console.say)
     _say_compiling()
     done = compared(chosen, measured, file=path, cfc=cfc, watch=_watched)
     found, runs = done.misfits, done.runs
-    answer = account(done, about)
+    answer = json_of(done, about)
     by = ["--profile", str(profile)] if profile else []
     command = " ".join(map(shlex.quote, ["rollover", "compare", scenario, *recordings, *by]))
     with results.whole(folder) as part:
@@ -158,7 +158,7 @@ def _two_runs(
     found = pair(result(Path(baseline)), result(Path(others[0])))
     folder = out or Path("out", "compare", Path(others[0]).resolve().name)
     about = {side: getattr(found, side).answer["scenario_hash"] for side in ("baseline", "candidate")}
-    results.claim_account(folder, PAIR, {"hashes": about}, [JSON, PAGE, PICTURE], force=force)
+    results.claim_report(folder, PAIR, {"hashes": about}, [JSON, PAGE, PICTURE], force=force)
     answer = {"format": PAIR, "hashes": about, **summary(found), "answer": in_words(found)}
     command = " ".join(map(shlex.quote, ["rollover", "compare", baseline, *others]))
     with results.whole(folder) as part:

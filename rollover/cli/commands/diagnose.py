@@ -148,7 +148,7 @@ def diagnose(
     from rollover.calibration.posterior import OPTION, installed, table
     from rollover.cli import console
     from rollover.comparison.recordings import held_out, read
-    from rollover.diagnosis import account, diagnosed_text
+    from rollover.diagnosis import diagnosed_text, json_of
     from rollover.diagnosis.asked import check_is_drop
     from rollover.diagnosis.fit.jobs import Executor
     from rollover.diagnosis.io import DRAWS, FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
@@ -184,7 +184,7 @@ def diagnose(
         **({"draws": draws} if posterior else {}),
     }
     about["origin"] = results.origin(path, folder, set_ or [])
-    results.claim_account(folder, FORMAT, about, FILES, force=force, say=console.say)
+    results.claim_report(folder, FORMAT, about, FILES, force=force, say=console.say)
     console.say("asking the sensors first")
     findings = sensor_precheck(chosen, measured)
     # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted
@@ -207,7 +207,7 @@ def diagnose(
             executor=executor,
         )
         overlays = series(chosen, list(measured.items()), found, executor.children)
-        answer = account(found, about, plain(findings))
+        answer = json_of(found, about, plain(findings))
         with results.whole(folder) as part, ThreadPoolExecutor(1) as beside:
             results.write_json(part / JSON, answer)
             if found.posterior is not None:
@@ -257,7 +257,7 @@ def _diagnose_model(
     from rollover.comparison.recordings import held_out, read
     from rollover.diagnosis.fit.jobs import Executor
     from rollover.diagnosis.io import FORMAT, JSON
-    from rollover.diagnosis.own_model import account, diagnose_model, files
+    from rollover.diagnosis.own_model import diagnose_model, files, json_of
     from rollover.diagnosis.own_model.tables import tables
     from rollover.system.processes import cores
     from rollover.system.writing import notes
@@ -281,11 +281,11 @@ def _diagnose_model(
         "tolerance": allowed,
         "origin": results.origin(path, folder),
     }
-    results.claim_account(folder, FORMAT, about, (JSON,), force=force, say=console.say)
+    results.claim_report(folder, FORMAT, about, (JSON,), force=force, say=console.say)
     about_fits = json.dumps([about, results.versions()], sort_keys=True)
     with Executor(cores() if workers is None else workers, notes(folder), about_fits) as executor:
         found = diagnose_model(model, measured, hold_out=held, tolerance=allowed, say=console.say, executor=executor)
-    answer = account(model, found, about)
+    answer = json_of(model, found, about)
     with results.whole(folder) as part:
         results.write_json(part / JSON, answer)
     executor.close()

@@ -88,7 +88,7 @@ def identify_(
         terminal=terminal_speed,
         keep=keep,
     )
-    report = identification.account(answer)
+    report = identification.json_of(answer)
     _write(folder, answer.soil, report)
     for reason in answer.refused:
         console.say(f"left out: {reason}")

@@ -80,7 +80,7 @@ def plan_(
     from rollover.assessment import results
     from rollover.cli import console
     from rollover.comparison.synthesis import DROP
-    from rollover.diagnosis.planning.account import FILES, FORMAT, JSON, PAGE, account
+    from rollover.diagnosis.planning.io import FILES, FORMAT, JSON, PAGE, json_of
     from rollover.diagnosis.planning.plan import plan, usual_noise
     from rollover.diagnosis.planning.planned import Instruments
     from rollover.dynamics.drop_test import unfit
@@ -107,9 +107,9 @@ def plan_(
         "uncertain": dict(instruments.uncertain),
     }
     about["origin"] = results.origin(path, folder, set_ or [])
-    results.claim_account(folder, FORMAT, about, FILES, force=force, say=console.say)
+    results.claim_report(folder, FORMAT, about, FILES, force=force, say=console.say)
     found = plan(chosen, conditions=conditions, instruments=instruments, between=pairs, say=console.say)
-    answer = account(found, about)
+    answer = json_of(found, about)
     from viz.pages.plan import page
 
     given = [("--between", between), ("--sensor", sensor), ("--noise", noise), ("--uncertain", uncertain)]

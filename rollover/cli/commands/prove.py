@@ -46,7 +46,7 @@ def prove(
     truth: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Of --export: the truth.", show_default="DIR-truth.json")
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/prove"),
+    out: Annotated[Path, typer.Option(help="Folder of the full report.")] = Path("out/prove"),
     workers: Annotated[int | None, typer.Option(help="Cases at once", show_default="number of cores", min=0)] = None,
     rig: Annotated[str, typer.Option(help="What is tested: drop, or overturn (minutes a case).")] = "drop",
     effects: Annotated[
@@ -102,7 +102,7 @@ def prove(
     about = {"cases": cases, "seed": seed, "kinds": kinds or [], "effects": effects or []}
     about |= {"rig": rig} if rig != "drop" else {}
     about |= {"background": _share_of(background)} if background is not None else {}
-    results.claim_account(out, runner.FORMAT, about, ACCOUNT, force=force)
+    results.claim_report(out, runner.FORMAT, about, ACCOUNT, force=force)
 
     def tell(seal: Seal) -> None:
         console.say(f"Sealed: the truth of {seal.cases} cases has the hash {seal.digest}; the diagnosis starts now.")
@@ -124,9 +124,9 @@ def prove(
             )
         except ValueError as e:
             raise InputError(Fault(file="rollover prove", message=str(e))) from None
-    account = results.plain({**proof.account, "versions": results.versions()})
+    report = results.plain({**proof.report, "versions": results.versions()})
     with results.whole(out) as part:
-        results.write_json(part / JSON, account)
+        results.write_json(part / JSON, report)
         results.write_json(part / SEAL, proof.seal.public())
         opened = {"format": "rollover-truths/1", "salt": proof.seal.salt, "truths": proof.truths}
         (part / TRUTH).write_text(json.dumps(opened, indent=1), encoding="utf-8")
@@ -134,14 +134,14 @@ def prove(
         (part / DIAGNOSES).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
         from viz.pages.proof import page
 
-        text = page(account, command=_command(cases, seed, about), versions=account["versions"])
+        text = page(report, command=_command(cases, seed, about), versions=report["versions"])
         (part / PAGE).write_text(text, encoding="utf-8")
     if as_json:
-        print(json.dumps(account, indent=2))
+        print(json.dumps(report, indent=2))
     else:
-        console.tell("\n".join([*sentences(account["summary"]), f"Written to {out}"]))
+        console.tell("\n".join([*sentences(report["summary"]), f"Written to {out}"]))
     if not proof.diagnoses:
-        console.say(f"Every diagnosis failed; the first: {account['rows'][0]['failure']}")
+        console.say(f"Every diagnosis failed; the first: {report['rows'][0]['failure']}")
         raise typer.Exit(FAILED)
 
 
@@ -162,7 +162,7 @@ def _command(cases: int, seed: int, about: dict[str, Any]) -> str:
 
 
 def sentences(summary: dict[str, Any]) -> list[str]:
-    """The account in a few lines."""
+    """The report in a few lines."""
     said = {
         "False alarms where nothing was": summary["false_alarms"],
         "One effect: detected": summary["detected"],

@@ -47,7 +47,7 @@ def regress(
     ] = None,
     update: Annotated[bool, typer.Option("--update", help="Write the baselines anew; needs --reason.")] = False,
     reason: Annotated[str, typer.Option(help="Why the loads may be others from now on; kept in the baseline.")] = "",
-    out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/regress"),
+    out: Annotated[Path, typer.Option(help="Folder of the full report.")] = Path("out/regress"),
     workers: Annotated[int | None, typer.Option(help="Runs at once", show_default="number of cores", min=0)] = None,
     time_limit: Annotated[float, typer.Option(help="Wall time for each run, s.", min=1.0, max=LONGEST)] = 600.0,
     force: Force = False,
@@ -75,10 +75,10 @@ def regress(
         named = found.get("scenarios")
         before = {*map(str, named if isinstance(named, list) else ())}
         shared = before & {*selection}
-        return f"replaces the account of {', '.join(sorted(before))}" if shared else ""
+        return f"replaces the report of {', '.join(sorted(before))}" if shared else ""
 
-    results.claim_account(
-        out, FORMAT, {"scenarios": selection}, ACCOUNT, force=force, own_account=overlaps, say=console.say
+    results.claim_report(
+        out, FORMAT, {"scenarios": selection}, ACCOUNT, force=force, own_report=overlaps, say=console.say
     )
     if not is_warm():
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
@@ -94,19 +94,19 @@ def regress(
                 answers = failed = e.answers
         else:
             answers = regression.compared(choice, workers=workers, time_limit=time_limit, show=show)
-    account = _account(selection, answers, _hash(choice.files))
+    report = _account(selection, answers, _hash(choice.files))
     with updating(out, baselines.texts(new)) as part:
-        results.write_json(part / JSON, account)
+        results.write_json(part / JSON, report)
         results.write_csv(part / CSV, _rows(answers))
-        (part / PAGE).write_text(_page(answers, scenarios or [], account["scenario_hash"]), encoding="utf-8")
+        (part / PAGE).write_text(_page(answers, scenarios or [], report["scenario_hash"]), encoding="utf-8")
     if as_json:
-        print(json.dumps(account, indent=2))
+        print(json.dumps(report, indent=2))
     else:
         console.regression(answers, str(out))
     if failed:
         console.say("Nothing was written to the baselines.")
         raise typer.Exit(FAILED)
-    if not account["ok"]:
+    if not report["ok"]:
         raise typer.Exit(THE_ANSWER_IS_NO)
 
 

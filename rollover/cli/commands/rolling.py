@@ -48,7 +48,7 @@ def rolling_(
 ) -> None:
     """Continuous or interrupted rolling of a narrow tractor, front ROPS: the planar calculation of Code 6."""
     from rollover.assessment import results
-    from rollover.assessment.rolled import FORMAT, OPTION, account, rolled
+    from rollover.assessment.rolled import FORMAT, OPTION, json_of, rolled
     from rollover.assessment.standing import file_of, scenario_of
     from rollover.cli import console
     from rollover.spec import document
@@ -60,8 +60,8 @@ def rolling_(
     folder = out or Path("out", "rolling", Path(name).stem)
     about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), "given": given, **chosen.own_code}
     about["origin"] = results.origin(file_of(name), folder, set_ or [])
-    results.claim_account(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
-    answer = account(asked, found, about)
+    results.claim_report(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
+    answer = json_of(asked, found, about)
     words = [f"--set {shlex.quote(s)}" for s in set_ or []] + [f"{OPTION} {shlex.quote(s)}" for s in input_ or []]
     text = page(answer, command=" ".join(["rollover rolling", shlex.quote(name), *words]))
     hand_out(answer, text, folder, (JSON, PAGE), as_json=as_json, show=lambda: console.rolling(answer, str(folder)))

@@ -61,7 +61,7 @@ def rops_(
 ) -> None:
     """Load over deflection of a frame given by its sections: the static sequence, hinges, collapse, verdict."""
     from rollover.assessment import results
-    from rollover.assessment.frame_account import FORMAT, account, file_of, scenario_of, told
+    from rollover.assessment.frame_json import FORMAT, file_of, json_of, scenario_of, told
     from rollover.assessment.frame_test import frame_test
     from rollover.cli import console
     from rollover.spec import document
@@ -71,7 +71,7 @@ def rops_(
     folder = out or Path("out", "rops", Path(name).stem)
     about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), **chosen.own_code}
     about["origin"] = results.origin(file_of(name), folder, set_ or [])
-    results.claim_account(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
+    results.claim_report(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
     try:
         with told(file_of(name)), console.counting("loads") as show:
             found = frame_test(chosen, segments=segments, clamped=clamped, speed=speed or 0.0, progress=show)
@@ -80,7 +80,7 @@ def rops_(
         raise typer.Exit(FAILED) from None
     if clamped and not found.rops.mounts:
         console.say(f"{name}: --clamped changes nothing: the frame has no mounts, and feet are held still as they are")
-    answer = account(found, about)
+    answer = json_of(found, about)
     words = [] if mass is None else ["--mass", f"{mass:g}"]
     words += ["--segments", str(segments)] if segments != SEGMENTS else []
     words += ["--clamped"] if clamped else []

@@ -43,7 +43,7 @@ def score(
     answer = results.plain({**scored(found, given, truth or truth_beside(cases)), "versions": results.versions()})
     folder = out or Path("out", "score", answers.stem)
     about = {"by": found.by, "seal": answer["seal"]}
-    results.claim_account(folder, SCORE_FORMAT, about, (JSON, PAGE), force=force)
+    results.claim_report(folder, SCORE_FORMAT, about, (JSON, PAGE), force=force)
     words = ["rollover", "score", str(cases), str(answers), *(["--truth", str(truth)] if truth else [])]
     text = page(answer, command=" ".join(map(shlex.quote, words)), versions=answer["versions"])
     said = "\n".join([*sentences(answer["summary"]), f"Written to {folder}"])

@@ -41,7 +41,7 @@ def write_sealed_cases(order: Order, folder: Path, truth: Path, *, force: bool, 
     names += [p.name for p in folder.glob("case-*")] if (folder / sealed_cases.LIST).is_file() else []
     if folder.exists() and not force and any(folder.iterdir() if folder.is_dir() else [folder]):
         raise InputError(Fault(file=str(folder), message="exists; --force replaces it, another name leaves it"))
-    results.claim_account(folder, sealed_cases.FORMAT, {}, names, force=force)
+    results.claim_report(folder, sealed_cases.FORMAT, {}, names, force=force)
     check_free(truth, force=force)
     hold(truth)
     seed = secrets.randbelow(LARGEST) if order.seed is None else order.seed
@@ -61,7 +61,7 @@ def write_sealed_cases(order: Order, folder: Path, truth: Path, *, force: bool, 
         except ValueError as e:
             raise InputError(Fault(file="rollover prove", message=str(e))) from None
         listed = catalogue.candidates("drop" if order.rig == "drop" else "rollover")
-        results.write_json(part / sealed_cases.LIST, {**made.account, "versions": results.versions()})
+        results.write_json(part / sealed_cases.LIST, {**made.report, "versions": results.versions()})
         candidates = {"format": sealed_cases.CANDIDATES_FORMAT, "candidates": listed}
         results.write_json(part / sealed_cases.CANDIDATES, candidates)
         results.write_json(part / SEAL, made.seal.public())
@@ -72,6 +72,6 @@ def write_sealed_cases(order: Order, folder: Path, truth: Path, *, force: bool, 
     kept.chmod(PRIVATE)  # before anybody sees it
     kept.replace(truth)
     if as_json:
-        print(json.dumps({**made.account, "seal": made.seal.public(), "truth": str(truth)}, indent=2))
+        print(json.dumps({**made.report, "seal": made.seal.public(), "truth": str(truth)}, indent=2))
     else:
         console.tell(f"{order.cases} sealed cases in {folder}; the truth, of hash {made.seal.digest}, is {truth}")

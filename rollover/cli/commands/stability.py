@@ -44,7 +44,7 @@ def stability_(
     """Static stability angle against heading: lift-off, free pivot, stop and overturn, beside closed forms."""
     from ground.compiled import is_warm
     from rollover.assessment import results
-    from rollover.assessment.standing import FORMAT, account, file_of, found_for, scenario_of
+    from rollover.assessment.standing import FORMAT, file_of, found_for, json_of, scenario_of
     from rollover.cli import console
     from rollover.spec import document
 
@@ -52,7 +52,7 @@ def stability_(
     folder = out or Path("out", "stability", Path(name).stem)
     about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), **chosen.own_code}
     about["origin"] = results.origin(file_of(name), folder, set_ or [])
-    results.claim_account(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
+    results.claim_report(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
     if not is_warm():
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     try:
@@ -61,7 +61,7 @@ def stability_(
     except ArithmeticError as e:
         console.say(f"{name}: {e}")
         raise typer.Exit(FAILED) from None
-    answer = account(found, about)
+    answer = json_of(found, about)
     command = " ".join(
         [*map(shlex.quote, ["rollover", "stability", name, "--headings", str(headings)])]
         + [f"--set {shlex.quote(s)}" for s in set_ or []]

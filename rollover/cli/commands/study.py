@@ -86,49 +86,49 @@ def study(
     words = ["rollover", "study", name, *(w for s in set_ or [] for w in ("--set", s))]
     command = " ".join(map(shlex.quote, [*words, *(["--out", str(out)] if out else [])]))
 
-    def drawn(done: Conducted, account: Mapping[str, Any]) -> str:
+    def drawn(done: Conducted, report: Mapping[str, Any]) -> str:
         from viz.pages.study import page
 
-        return page(chosen, done, account, command=command)
+        return page(chosen, done, report, command=command)
 
-    account = ready.carried_out(way, page=drawn, watch=console.counting, say=console.say)
+    report = ready.carried_out(way, page=drawn, watch=console.counting, say=console.say)
     if as_json:
-        print(json.dumps(results.plain(account), indent=2))
+        print(json.dumps(results.plain(report), indent=2))
     else:
-        console.tell("\n".join([*sentences(account), f"Results: {ready.folder}"]))
-    if not account["cases"]["done"]:
-        console.say(f"{path}: every case failed; the first: {account['failures'][0]['sentence']}")
+        console.tell("\n".join([*sentences(report), f"Results: {ready.folder}"]))
+    if not report["cases"]["done"]:
+        console.say(f"{path}: every case failed; the first: {report['failures'][0]['sentence']}")
         raise typer.Exit(FAILED)
 
 
-def _made(account: dict[str, Any]) -> list[str]:
+def _made(report: dict[str, Any]) -> list[str]:
     """What was run, of what, by which integrator, and how far Exudyn's cases lie from it."""
     from rollover.studies import reference
 
-    n = account["cases"]
-    lines = [account["title"], *([account["differs"]] if account.get("differs") else [])]
-    lines += [f"Set: {', '.join(account['set'])}"] if account.get("set") else []
-    made_by = account.get("integrator", "drop")
-    ran = f"{account['ran']} run now" + ("" if made_by == "drop" else f" by {made_by}")
+    n = report["cases"]
+    lines = [report["title"], *([report["differs"]] if report.get("differs") else [])]
+    lines += [f"Set: {', '.join(report['set'])}"] if report.get("set") else []
+    made_by = report.get("integrator", "drop")
+    ran = f"{report['ran']} run now" + ("" if made_by == "drop" else f" by {made_by}")
     lines.append(f"{n['done']} of {n['all']} cases done, {n['failed']} failed; {ran}")
-    said = reference.sentence(account.get("reference_check"))
+    said = reference.sentence(report.get("reference_check"))
     return [*lines, said] if said else lines
 
 
-def sentences(account: dict[str, Any]) -> list[str]:
-    """The account in a few lines."""
+def sentences(report: dict[str, Any]) -> list[str]:
+    """The report in a few lines."""
     from rollover.assessment.ledger import of_cases
     from rollover.cli.console import readable
     from rollover.studies import failures
     from viz.pages.report import series_unit
 
-    lines = _made(account)
-    for each in account["outputs"]:
+    lines = _made(report)
+    for each in report["outputs"]:
         unit = series_unit(each["unit"])[0]
         lines.append(f"{each['name']}, {unit}")
         if not each["cases"]:
             lines.append("  no case has it")
-        elif not account["drawn"]:
+        elif not report["drawn"]:
             least, most = (readable(each[key], each["unit"]) for key in ("least", "largest"))
             lines.append(f"  {least} to {most} over {each['cases']} cases")
         for q in each["quantiles"]:
@@ -152,18 +152,18 @@ def sentences(account: dict[str, Any]) -> list[str]:
             lines.append(f"  {s['axis']}: first {s['first']:.2f} +- {s['first_half_width']:.2f}, {total}")
         for m in each["morris"]:
             lines.append(f"  {m['axis']}: mean magnitude of effects {readable(m['magnitude'], each['unit'])}")
-    if (r := account["reliability"]) and "reason" not in r:
+    if (r := report["reliability"]) and "reason" not in r:
         lines.append(
             f"Beyond the limit by importance sampling {r['probability']:.3g} ({r['low']:.3g} to {r['high']:.3g}), "
             f"FORM {r['form_probability']:.3g}, beta {r['beta']:.3g}"
         )
-    if (ledger := account["ledger"])["open"]:
+    if (ledger := report["ledger"])["open"]:
         lines.append(of_cases(ledger))
-    if account["from_rest"]:
-        lines.append(f"{account['from_rest']} cases had no static balance and began from rest")
-    if said := failures.sentence(account["failures_along"]):
+    if report["from_rest"]:
+        lines.append(f"{report['from_rest']} cases had no static balance and began from rest")
+    if said := failures.sentence(report["failures_along"]):
         lines.append(said)
-    lines += [f"{f['cases']} failed ({f['failure']}): {f['sentence']}" for f in account["failures"][:5]]
-    if (w := account["worst"]) is not None:
+    lines += [f"{f['cases']} failed ({f['failure']}): {f['sentence']}" for f in report["failures"][:5]]
+    if (w := report["worst"]) is not None:
         lines.append(f"Worst case: point {w['point']}, written to {w['file']}")
     return lines

@@ -94,7 +94,7 @@ def _diagnosed(model: ForwardModel, asked: Asked, tolerance: float) -> Diagnosis
     return replace(reported(concluded), baseline=always)
 
 
-def account(model: ForwardModel, found: Diagnosis, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def json_of(model: ForwardModel, found: Diagnosis, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """What diagnosis.json says of a model of one's own, bare JSON values; as of a scenario, and the fitted model."""
     fitted = {name: {k: v for k, v in asdict(i).items() if v is not None} for name, i in found.baseline.items()}
-    return {**io.account(found, about), "model": {"title": model.title, "parameters": fitted}}
+    return {**io.json_of(found, about), "model": {"title": model.title, "parameters": fitted}}

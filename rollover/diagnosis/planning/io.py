@@ -14,7 +14,7 @@ JSON, PAGE = "plan.json", "report.html"
 FILES = (JSON, PAGE)
 
 
-def account(found: Plan, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def json_of(found: Plan, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """What plan.json says, bare JSON values; `about` names what was asked."""
     fields = asdict(found)
     effects, pairs, tests = (fields.pop(key) for key in ("effects", "pairs", "next_tests"))

@@ -14,7 +14,7 @@ from rollover.comparison.misfit import summary
 FORMAT = "rollover-calibrate/1"
 
 
-def account(c: Calibration, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def json_of(c: Calibration, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """What calibrate.json says; `about` names what was asked."""
     return {
         "format": FORMAT,

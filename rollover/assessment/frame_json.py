@@ -85,7 +85,7 @@ def scenario_of(name: str | Path, mass: float | None = None) -> Scenario:
     )
 
 
-def account(found: FrameTest, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def json_of(found: FrameTest, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """What rops.json says; `about` names what was asked."""
     vehicle = found.scenario.vehicle
     assert isinstance(vehicle, Vehicle)
