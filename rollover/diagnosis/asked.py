@@ -45,9 +45,9 @@ def diagnosed(
     if is_file or not isinstance(scenario, (str, Path, Scenario)):
         if reference or posterior or estimate is True or not isinstance(tolerance, (int, float)):
             message = (
-                "not of a model of one's own; one tolerance for all channels is allowed, no reference, no estimate"
+                "not of a model of one's own; one tolerance for all channels is allowed, "
+                "no reference, no estimate, no posterior"
             )
-            message += ", no posterior"
             raise InputError(Fault(path="diagnose", message=message))
         model = load_model(Path(scenario)) if isinstance(scenario, (str, Path)) else declared(scenario)
         with tables(model):

@@ -103,7 +103,9 @@ class Dataset:
     first_impact: float = np.inf  # s, after which a run may take another course
     doubtful: tuple[Mapping[str, Any], ...] = ()  # values exchanged for 1 sigma of each uncertain condition
     nuisance: Array | None = None  # what that does to the stack, SI, (n, q)
-    without_leaps: bool = False  # whether samples about a leap count nothing, instead of being moved to the measured
+    without_discontinuities: bool = (
+        False  # whether samples about a jump count nothing, instead of being moved to the measured
+    )
 
     def cut(self, inside: Sequence[NDArray[np.bool_]]) -> Dataset:
         """The samples of each signal that are `inside` (n,) of it."""
@@ -120,10 +122,10 @@ class Dataset:
         """What takes the uncertain conditions, and zeros, out of a whitened misfit."""
         return marginalised(self.uncertain)
 
-    def marginalised_beside(self, leaps: NDArray[np.int64]) -> Marginalised:
-        """The same beside `leaps`: samples that count nothing tell nothing of what is uncertain either."""
-        asked = self.without_leaps and leaps.size
-        return marginalised(self.worth(leaps)[:, None] * self.uncertain) if asked else self.marginalised
+    def marginalised_beside(self, discontinuities: NDArray[np.int64]) -> Marginalised:
+        """The same beside `discontinuities`: samples that count nothing tell nothing of what is uncertain either."""
+        asked = self.without_discontinuities and discontinuities.size
+        return marginalised(self.worth(discontinuities)[:, None] * self.uncertain) if asked else self.marginalised
 
     @cached_property
     def uncertain(self) -> Array:
@@ -246,7 +248,7 @@ class Dataset:
             if discontinuities.size
             else np.ones(self.count)
         )
-        if self.without_leaps:
+        if self.without_discontinuities:
             found[discontinuities] = 0.0
         return found
 

@@ -177,5 +177,5 @@ class Simulations:
         for point in (before, after):
             d[self._discontinuities.get(key_at(r, *point, shift), NONE)] = 0.0
         e = self.dataset[r]
-        leaps = self._discontinuities.get(key_at(r, *before, shift), NONE)
-        return e.marginalised_beside(leaps)(e.worth(leaps) * e.whitened(d))
+        discontinuities = self._discontinuities.get(key_at(r, *before, shift), NONE)
+        return e.marginalised_beside(discontinuities)(e.worth(discontinuities) * e.whitened(d))

@@ -117,9 +117,9 @@ def _gained(e: Dataset, gain: float) -> Dataset:
         column[part] = gain * s.values
         columns.append(column)
     # a sample moved to the measured one as far as its neighbours go is no multiple of a gain; beside a discrepancy that
-    # noise remembers, samples after a leap are wide anyway
+    # noise remembers, samples after a jump are wide anyway
     is_white = not any(s.ar for s in e.signals)
-    return replace(e, nuisance=np.stack(columns, axis=1), without_leaps=is_white)
+    return replace(e, nuisance=np.stack(columns, axis=1), without_discontinuities=is_white)
 
 
 def showing(e: Dataset, raw: Array) -> Dataset:
