@@ -270,3 +270,20 @@ def test_noise_floors_of_the_channels() -> None:
 
 def test_a_simulation_has_no_sensors() -> None:
     assert prechecks(Recording(title="s", time=TIME, channels=TRUE, source="simulation")) == ()
+
+
+@pytest.mark.parametrize("number", [8, 20])
+@pytest.mark.parametrize("at", [-0.1, 0.02, 0.05])
+def test_samples_lost_under_a_counted_clock_are_found_in_contact_too(at: float, number: int) -> None:
+    """Every channel loses the same rows: the place and about how many are told, and no gain is blamed for it."""
+    whole = drop(3)
+    kept = np.ones(N, dtype=bool)
+    first = int(np.searchsorted(whole.time, at))
+    kept[first : first + number] = False
+    time = whole.time[: kept.sum()]
+    lossy = replace(whole, time=time, channels={name: v[kept] for name, v in whole.channels.items()})
+    found = [f for f in prechecks(lossy) if f.channel == P]
+    assert [f.check for f in found] == ["gap"]
+    assert found[0].start == pytest.approx(at, abs=6 * STEP)
+    assert found[0].error is not None
+    assert abs(found[0].value - number) < 3.0 * found[0].error + 0.5

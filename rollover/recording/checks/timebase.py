@@ -19,7 +19,6 @@ SIDES = (6, 12, 24, 48)  # samples to either side of a gap, through which a para
 CHANCE = 1e-4  # that a clean channel shows a gap
 WHOLE = 0.25  # of a step, by which a gap may miss a whole number of samples
 STEADY = 0.5  # of the speed, by which it may change across a gap: else something begins or ends there
-SAMPLES = 2.0  # deviations at least that one sample's way is: else how many are lost is not told
 MOVING = ("position_x", "position_y", "position_z", "roll", "pitch", "yaw", "angle", "sinkage", "deflection")
 
 
@@ -70,11 +69,12 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
         if t.values.size < 4 * side:
             continue
         leap, way, bend, error, slope = _across(t, side)
+        bend += _bends(t, side, leap, error)
         number = leap / np.where(way == 0.0, np.inf, way)
         whole = np.round(number)
         doubt = np.hypot(error, whole * slope) / np.maximum(np.abs(way), 1e-300)
         sure = np.abs(leap) > beyond * error + bend
-        sure &= (whole >= 1.0) & (np.abs(number - whole) < WHOLE + 3.0 * doubt) & (error * SAMPLES < np.abs(way))
+        sure &= (whole >= 1.0) & (np.abs(number - whole) < WHOLE + 3.0 * doubt) & (np.abs(way) > beyond * slope)
         for k in map(int, np.flatnonzero(sure)):
             near = np.abs(leap[max(0, k - side) : k + side + 1])
             if abs(leap[k]) >= near.max():
@@ -100,6 +100,18 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
         f"place{'s' if len(kept) > 1 else ''}, though its stamps are even ({1.0 / t.step:.6g} Hz): lost samples "
         "(dropout of the logger) under a counted clock, all later stamps are early",
     )
+
+
+def _bends(t: Trace, side: int, leap: Array, error: float) -> Array:
+    """Infinite where a parabola through half as many samples says another jump: a bend among them feigns it, (n - 1,).
+
+    The difference of nested fits has the shorter's variance less the longer one's; two deviations of it are let pass:
+    1 of 20 true jumps is left to another length.
+    """
+    if side == SIDES[0]:
+        return np.zeros_like(leap)
+    half, _, _, wide, _ = _across(t, side // 2)
+    return np.where(np.abs(half - leap) < 2.0 * math.sqrt(wide * wide - error * error), 0.0, np.inf)
 
 
 def _across(t: Trace, side: int) -> tuple[Array, Array, Array, float, float]:
