@@ -19,6 +19,7 @@ SIDES = (6, 12, 24, 48)  # samples to either side of a gap, through which a para
 CHANCE = 1e-4  # that a clean channel shows a gap
 WHOLE = 0.25  # of a step, by which a gap may miss a whole number of samples
 STEADY = 0.5  # of the speed, by which it may change across a gap: else something begins or ends there
+SAMPLES = 2.0  # deviations at least that one sample's way is: else whether their number is whole is not told
 MOVING = ("position_x", "position_y", "position_z", "roll", "pitch", "yaw", "angle", "sinkage", "deflection")
 
 
@@ -69,7 +70,8 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
         if t.values.size < 4 * side:
             continue
         leap, way, bend, error, slope = _across(t, side)
-        bend += _bends(t, side, leap, error)
+        # where the error hides a sample's way, a whole number of samples says nothing for a jump
+        bend += np.where(error * SAMPLES < np.abs(way), 0.0, _bends(t, side, leap, error))
         number = leap / np.where(way == 0.0, np.inf, way)
         whole = np.round(number)
         doubt = np.hypot(error, whole * slope) / np.maximum(np.abs(way), 1e-300)
