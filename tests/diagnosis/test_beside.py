@@ -135,7 +135,7 @@ def test_what_conditions_surely_prefer_leads(left: tuple[float, ...], x: float, 
         (9.0, 2.2, 1.0, 2, "soil-layer"),
     ],
 )
-def test_a_further_number_gains_more_than_a_draw_of_the_discrepancy(
+def test_a_further_number_gains_more_than_one_draw_does(
     base: float, simple: float, bent: float, numbers: int, leads: str
 ) -> None:
     one = fitted("soil-stiffness", (simple,) * DROPS)
@@ -144,7 +144,7 @@ def test_a_further_number_gains_more_than_a_draw_of_the_discrepancy(
 
 
 @pytest.mark.parametrize(("shared", "leads"), [(10.0, "soil-layer"), (10.0 * DROPS, "soil-stiffness")])
-def test_what_drops_repeat_prefers_none_of_two_as_often_as_there_are_drops(shared: float, leads: str) -> None:
+def test_what_drops_repeat_counts_once_between_two(shared: float, leads: str) -> None:
     """An excess of 240 squares of six drops: 1.7 standard errors of those that come anew, 0.7 of what is repeated."""
     best, simple = fitted("soil-layer", (0.5,) * DROPS, numbers=2), fitted("soil-stiffness", (1.5,) * DROPS)
     assert simplest([best, simple], GROUPS, shared)[0].candidates[-1].id == leads

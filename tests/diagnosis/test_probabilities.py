@@ -46,7 +46,7 @@ def test_what_leaves_as_much_is_as_probable(monkeypatch: pytest.MonkeyPatch) -> 
     assert found["soil-layer"] > 0.45
 
 
-def test_of_two_that_leave_as_much_the_one_of_fewer_numbers_is_likelier(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_two_alike_the_one_of_fewer_numbers_is_likelier(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "residual_rms", lambda _, f: dict.fromkeys(CHANNELS, 0.02 if f.candidates else 0.1))
     tried = explanation((2.0,) * DROPS, fitted("soil-layer", (1.0,) * DROPS, 2), fitted("mass", (1.0,) * DROPS))
     found = probabilities(PROBLEM, tried, tried, 40, is_noise=False)
@@ -59,13 +59,13 @@ def test_what_models_usually_miss_is_nothing(monkeypatch: pytest.MonkeyPatch) ->
     assert found["soil-layer"] < 0.1
 
 
-def test_what_no_effect_meets_and_models_seldom_miss_is_not_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_no_effect_meets_is_not_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     found = beside(monkeypatch, 0.3, {"soil-layer": 0.25, "soil-crust": 0.28})
     assert next(iter(found)) == "not-listed"
     assert found["not-listed"] > 0.8
 
 
-def test_an_untouched_channel_speaks_against_an_effect_that_is_not_listed() -> None:
+def test_an_untouched_channel_speaks_against_not_listed() -> None:
     """Beside a usual remainder an unknown effect adds more than is seen; beside a large one it is likelier."""
     little, much = (log_touched(v, 1e-4) - log_usual(v, 1e-4) for v in (0.005, 0.3))
     assert little < -0.3

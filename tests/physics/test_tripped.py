@@ -51,7 +51,7 @@ def seat(scenario: Scenario) -> tuple[float, float, float]:
 # ---------------------------------------------------------------- ditch
 
 
-def test_with_its_left_wheels_in_a_ditch_it_leans_as_their_depth_says() -> None:
+def test_in_a_ditch_it_leans_as_the_depth_says() -> None:
     """asin(depth/track) = 15.5 degrees, on stiff tyres and a wide bottom, once it has rocked itself out."""
     wide = {"kind": "ditch", "depth": 0.4, "bottom": 4.0, "angle_deg": 60.0, "centre": [0.0, 3.9]}
     base = stiff(shipped("ditch"), 2.0).replaced(
@@ -63,7 +63,7 @@ def test_with_its_left_wheels_in_a_ditch_it_leans_as_their_depth_says() -> None:
 
 
 @pytest.mark.parametrize(("depth", "over"), [(0.4, False), (1.1, True)])
-def test_the_tractor_leans_into_a_shallow_ditch_and_overturns_into_a_deep_one(depth: float, over: bool) -> None:
+def test_it_leans_in_a_shallow_ditch_and_overturns_in_a_deep_one(depth: float, over: bool) -> None:
     """Limit at rest: track sin(34.9 deg) = 0.86 m; half of that leans it by asin(depth/track), and its tyres."""
     rec = done(shipped("ditch").replaced({"ground.surface.depth": depth})).recording
     lean = math.degrees(-rec["chassis/roll"].min())
@@ -174,7 +174,7 @@ def test_the_dolly_stops_as_the_standard_says() -> None:
     assert (bank["height"], flange["height"]) == pytest.approx((9.0 * INCH, 4.0 * INCH), abs=1e-3)
 
 
-def test_without_a_flange_the_vehicle_leaves_the_dolly_at_its_speed() -> None:
+def test_without_a_flange_it_leaves_the_dolly_at_its_speed() -> None:
     """Nothing holds it: 13.41 m/s sideways but for the tyres' grip in the first ms, then a parabola without a roll."""
     base = shipped("dolly_rollover")
     parts = to_mapping(base)["ground"]["surface"]["parts"]

@@ -92,7 +92,7 @@ def test_gravity_in_an_accelerometer_is_told_at_rest() -> None:
         assert told(said, "gain", A) == []
 
 
-def test_gravity_is_told_from_three_axes_of_a_vehicle_on_its_side() -> None:
+def test_gravity_is_told_from_three_axes_of_one_on_its_side() -> None:
     random = np.random.default_rng(0)
     time = np.asarray(np.arange(2000) * 1e-3, dtype=np.float64)
     over = np.minimum(time / 0.8, 1.0) * 1.2  # rad

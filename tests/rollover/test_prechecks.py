@@ -274,7 +274,7 @@ def test_a_simulation_has_no_sensors() -> None:
 
 @pytest.mark.parametrize("number", [8, 20])
 @pytest.mark.parametrize("at", [-0.1, 0.02, 0.05])
-def test_samples_lost_under_a_counted_clock_are_found_in_contact_too(at: float, number: int) -> None:
+def test_samples_lost_under_a_counted_clock_are_found_in_contact(at: float, number: int) -> None:
     """Every channel loses the same rows: the place and about how many are told, and no gain is blamed for it."""
     whole = drop(3)
     kept = np.ones(N, dtype=bool)

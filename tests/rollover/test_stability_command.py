@@ -46,7 +46,7 @@ def test_account_of_a_vehicle(folder: Path) -> None:
 def test_page(folder: Path) -> None:
     page = (folder / "report.html").read_text()
     answer = json.loads((folder / "stability.json").read_text())
-    assert f"{answer['least']['balance_deg']:.1f} degrees at least" in page
+    assert f"{answer['least']['balance_deg']:.1f} degrees, whichever way it faces" in page
     assert f"{answer['headings'][1]['overturn_deg']:.2f}" in page
     assert "5.4-8 %" in page
     assert "<svg" in page

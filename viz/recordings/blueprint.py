@@ -38,6 +38,7 @@ LOADS: _Plots = (
     ("Impulse, N s", ("ground/impulse_normal", "rops/impulse")),
     ("Axle stop, N m s", ("axle/*/impulse",)),
     ("Contact area, cm\N{SUPERSCRIPT TWO}", ("ground/contact_area",)),
+    ("Occupant, kN", ("occupant/*/contact_force", "occupant/*/ground_force", "occupant/*/force")),
 )
 MOTION: _Plots = (
     ("Input: angle, deg", ("input/*/angle",)),
@@ -55,6 +56,7 @@ MOTION: _Plots = (
     ("Attitude, deg", ("chassis/pitch", "chassis/yaw", "axle/*/angle")),
     ("Position, m", ("chassis/position_?",)),
     ("Velocity, m/s", ("chassis/velocity_?",)),
+    ("Head and torso, m/s\N{SUPERSCRIPT TWO}", ("occupant/head/acceleration_?", "occupant/torso/acceleration_?")),
 )
 _MOUNTS = ("rops/mount/*/force_?", "rops/hinge/*/force_?")
 _MOMENTS = ("rops/mount/*/moment_?", "rops/hinge/*/moment_?", "rops/hinge/*/angle_?")

@@ -103,9 +103,7 @@ class Dataset:
     first_impact: float = np.inf  # s, after which a run may take another course
     doubtful: tuple[Mapping[str, Any], ...] = ()  # values exchanged for 1 sigma of each uncertain condition
     nuisance: Array | None = None  # what that does to the stack, SI, (n, q)
-    without_discontinuities: bool = (
-        False  # whether samples about a jump count nothing, instead of being moved to the measured
-    )
+    without_discontinuities: bool = False  # samples about a jump count nothing, instead of being moved
 
     def cut(self, inside: Sequence[NDArray[np.bool_]]) -> Dataset:
         """The samples of each signal that are `inside` (n,) of it."""

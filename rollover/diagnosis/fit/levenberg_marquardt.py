@@ -107,9 +107,8 @@ class Problem(Simulations):
     @property
     def samples_per_error(self) -> float:
         """Samples that share one error: those of a signal where a scatter or a tolerance prevails, else 1."""
-        every = [(e, s) for e in self.dataset for s in e.signals]
-        is_shared = all(e.model_error_dominates(s) for e, s in every)
-        return sum(e.shared(s) for e, s in every) / len(every) if is_shared else 1.0
+        shared = [e.shared(s) if e.model_error_dominates(s) else 0.0 for e in self.dataset for s in e.signals]
+        return sum(shared) / len(shared) if all(shared) else 1.0
 
     @property
     def samples_per_draw(self) -> float:
