@@ -68,27 +68,11 @@ def best_predictor(problem: Problem, one: Step, groups: Groups) -> Fitted:
     """The fit that leads a step: its best, unless another predicts surely more of what conditions held out miss.
 
     Simplicity prefers what is hardly worse by the errors of samples; conditions are what tells beside a discrepancy.
-    But they repeat it, and a further number is bent to it in each: it must gain more than that, (D23).
     """
-    able = [f for f in one.rivals if not ends_at_bound(f) and is_worth_its_numbers(problem, f, one.fitted)]
+    able = [f for f in one.rivals if not ends_at_bound(f)]
     ahead = min(able, key=lambda f: held_out(f, groups).left.sum(), default=one.fitted)
     more = share_beyond(problem, one.base, one.fitted, ahead, groups)
     return one.fitted if more is None or more.low <= 0.0 else ahead
-
-
-def is_worth_its_numbers(problem: Problem, fitted: Fitted, simple: Fitted) -> bool:
-    """Whether a fit gains more over one of fewer numbers than these by chance do of one draw of the discrepancy, (D23).
-
-    With one draw for all recordings each number that is bent to it gains a chi-square of one degree of freedom, in
-    units of the samples that share it.
-    """
-    from scipy.special import chdtri
-
-    more = len(fitted.x) - len(simple.x)
-    if more <= 0:
-        return True
-    dispersion = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks)) * problem.samples_per_draw
-    return bool(simple.left - fitted.left > dispersion * chdtri(more, TUNING.number_p_value))
 
 
 def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:
@@ -126,7 +110,7 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
 
     That was estimated from what the best leaves, whose form need not be the right one: a rival that explains nearly all
     that the best does is not excluded where it leaves no more than the discrepancy, or is of the same family. Nor is
-    one that explains half as much and belongs to those that hold the right one with 95 % by what they leave, (D25).
+    one that explains half as much and belongs to those that hold the right one with 95 % by what they leave, (D24).
     """
     near = confusion(one, groups, problem.samples_per_error)
     best, start = one.fitted, float(held_out(one.base, groups).left.sum())

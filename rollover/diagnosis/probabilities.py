@@ -1,4 +1,4 @@
-"""Probabilities over names, "nothing" and "not-listed" among them, by what each explanation leaves: (D24), (D25)."""
+"""Probabilities over names, "nothing" and "not-listed" among them, by what each explanation leaves: (D23), (D24)."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def probabilities(
 
 
 def _beside_noise(problem: Problem, tried: Explanation, found: Explanation) -> Iterable[tuple[str, float]]:
-    """Name and log evidence of each explanation by Schwarz's criterion, a datum each sample, (D24)."""
+    """Name and log evidence of each explanation by Schwarz's criterion, a datum each sample, (D23)."""
     base, first = tried.base, tried.first
     count = sum(b.residual.size for b in base.blocks)
     fits = list(first.rivals) if first is not None else []
@@ -70,7 +70,7 @@ def _beside_noise(problem: Problem, tried: Explanation, found: Explanation) -> I
 
 
 def _beside_discrepancy(problem: Problem, tried: Explanation) -> Iterable[tuple[str, float]]:
-    """Name and log evidence of each explanation by what it leaves of each channel, (D25)."""
+    """Name and log evidence of each explanation by what it leaves of each channel, (D24)."""
     left = residual_rms(problem, tried.base)
     yield NOTHING, log_evidence(problem, tried.base)
     yield NOT_LISTED, sum(log_touched(v, resolution(problem, c)) for c, v in left.items())
@@ -79,7 +79,7 @@ def _beside_discrepancy(problem: Problem, tried: Explanation) -> Iterable[tuple[
 
 
 def log_evidence(problem: Problem, fitted: Fitted) -> float:
-    """Log evidence of a fit beside a discrepancy that is one draw for all recordings, (D25)."""
+    """Log evidence of a fit beside a discrepancy that is one draw for all recordings, (D24)."""
     left = residual_rms(problem, fitted)
     usual = sum(log_usual(v, resolution(problem, c)) for c, v in left.items())
     return usual - 0.5 * len(fitted.x) * float(np.log(DRAWS * len(left)))

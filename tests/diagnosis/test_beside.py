@@ -17,7 +17,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.result import Share
 from rollover.diagnosis.selection.decision import Explanation
-from rollover.diagnosis.selection.forward_step import by_chance, simplest
+from rollover.diagnosis.selection.forward_step import by_chance
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.statements import usual_model_error_sentence
 from rollover.effects import EFFECTS, Search
@@ -123,31 +123,6 @@ def test_what_conditions_surely_prefer_leads(left: tuple[float, ...], x: float, 
     simple = fitted("sensor-clock-offset", (0.30, 0.31, 0.29, 0.32, 0.30, 0.28))
     one = explanation(SOME, simple, fitted("sensor-lag", left, x=x)).parts[0]
     assert best_predictor(PROBLEM, one, GROUPS).candidates[-1].id == leads
-
-
-@pytest.mark.parametrize(
-    ("base", "simple", "bent", "numbers", "leads"),
-    [
-        (9.0, 1.0, 0.5, 1, "soil-layer"),  # as few numbers: what conditions surely prefer
-        (9.0, 1.0, 0.5, 2, "soil-stiffness"),  # half an error for each sample: two draws of what all drops repeat
-        (9.0, 4.0, 1.0, 2, "soil-layer"),  # twelve of them for one number
-        (9.0, 2.2, 1.0, 3, "soil-stiffness"),  # five for two
-        (9.0, 2.2, 1.0, 2, "soil-layer"),
-    ],
-)
-def test_a_further_number_gains_more_than_one_draw_does(
-    base: float, simple: float, bent: float, numbers: int, leads: str
-) -> None:
-    one = fitted("soil-stiffness", (simple,) * DROPS)
-    rival = fitted("soil-layer", (bent,) * DROPS, numbers=numbers)
-    assert best_predictor(PROBLEM, explanation((base,) * DROPS, one, rival).parts[0], GROUPS).candidates[-1].id == leads
-
-
-@pytest.mark.parametrize(("shared", "leads"), [(10.0, "soil-layer"), (10.0 * DROPS, "soil-stiffness")])
-def test_what_drops_repeat_counts_once_between_two(shared: float, leads: str) -> None:
-    """An excess of 240 squares of six drops: 1.7 standard errors of those that come anew, 0.7 of what is repeated."""
-    best, simple = fitted("soil-layer", (0.5,) * DROPS, numbers=2), fitted("soil-stiffness", (1.5,) * DROPS)
-    assert simplest([best, simple], GROUPS, shared)[0].candidates[-1].id == leads
 
 
 def test_rivals_akin_or_within_the_discrepancy_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -45,7 +45,7 @@ def row(case: str, kind: str, truth: str, claimed: str | None, **more: Any) -> d
 
 
 @pytest.fixture
-def json_of() -> dict[str, Any]:
+def report() -> dict[str, Any]:
     rows = [
         row("case-0001", "single", "mass", "mass"),
         row("case-0002", "single", "mass", "slope"),

@@ -92,7 +92,7 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
     if not problem.effort.is_ensemble:
         fits = _refitted_where_slopes_mislead(inquiry, fits)
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
-    fits = simplest(fits, groups, problem.samples_per_draw)
+    fits = simplest(fits, groups, problem.samples_per_error)
     p = by_chance(base, fits, looked, problem.samples_per_error)
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
 
@@ -315,8 +315,7 @@ def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitt
     """Fits, best first, led by the one with the fewest numbers of those that are hardly worse than the best.
 
     Hardly worse: within a standard error, or within what jumps make the misfit rough by. Of those that are one and the
-    same to these recordings the one leads that asks for the more usual strength. `shared` samples of all have one error
-    in common, as a rig repeats it: what it lends to one fit it lends to that in each recording.
+    same to these recordings the one leads that asks for the more usual strength. `shared` samples have one error.
     """
     least = held_out(fits[0], groups).left.sum()
     near = [

@@ -27,7 +27,6 @@ class Grades:
     # share of the mismatch that the true effects explain at least; what resembles an unlisted effect leaves more;
     # chosen
     nearly_all: float = 0.95
-    number_p_value: float = 0.05  # p-value of the gain of a further number beside a discrepancy; usual level
     one_sided_confidence: float = 0.975  # probability: one side of a 95 % interval; definition
 
 
