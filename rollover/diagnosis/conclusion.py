@@ -70,7 +70,6 @@ class Asked:
     discrepancy: Discrepancy | None = None
     estimates: bool = False  # whether a model error is estimated, and answers that it makes doubtful are refused
     draws: int = 0  # of the numbers of what is named
-    yields: bool = False  # whether "unexplained" by noise is judged again beside a discrepancy, which is then estimated
     is_timed: bool = False  # whether clocks were set right that are off by far more than they may be
 
 
@@ -135,13 +134,7 @@ def concluded(
     acts = "rollover" if any(map(unfit, set_ups)) else "drop"
     candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_ups[0]))
     inquiry = Inquiry(
-        problem=problem,
-        candidates=candidates,
-        groups=groups,
-        phases=phases,
-        say=asked.say,
-        executor=executor,
-        yields=asked.yields and acts == "drop",
+        problem=problem, candidates=candidates, groups=groups, phases=phases, say=asked.say, executor=executor
     )
     return weighed(
         asked,

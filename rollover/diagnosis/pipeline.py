@@ -91,7 +91,6 @@ def diagnose(
         executor=executor,
         began=began,
         estimates=estimate is True,
-        yields=estimate == "unexplained" and not (reference or stated or general > 0.0),
         draws=posterior,
     )
     if reference:
@@ -109,10 +108,10 @@ def diagnose(
     found = _answered(first, usable, notes)
     if found.verdict == "unexplained" and shared:
         # beside a factor so large what else is missing may be out of sight
-        whole = replace(asked, yields=False)
-        other = _diagnosed(whole, without_inconsistent(every, [*some, *shared]), [*some, *shared, *wrong], notes)
+        other = _diagnosed(asked, without_inconsistent(every, [*some, *shared]), [*some, *shared, *wrong], notes)
         found = other if other.effects else found
-    if found.verdict == "unexplained" and asked.yields and isinstance(first, Conclusion):
+    is_open = estimate == "unexplained" and not (reference or stated or general > 0.0)
+    if found.verdict == "unexplained" and is_open and isinstance(first, Conclusion):
         found = _second_opinion(first, usable, notes) or found
     return checked(replace(found, clocks=zeros, seconds=clock.perf_counter() - began))
 

@@ -36,10 +36,7 @@ from tests.rollover.diagnosed import nothing_found
 def test_a_second_opinion_is_asked_of_what_is_unexplained(
     monkeypatch: pytest.MonkeyPatch, first: Verdict, stated: dict[str, Any], second: bool
 ) -> None:
-    yielding: list[bool] = []
-
     def concluded(asked: Asked, *_: object) -> Conclusion:
-        yielding.append(asked.yields)
         found = object.__new__(Conclusion)
         for name, value in (("asked", asked), ("verdict", first), ("grade", "whole")):
             object.__setattr__(found, name, value)
@@ -50,7 +47,6 @@ def test_a_second_opinion_is_asked_of_what_is_unexplained(
     monkeypatch.setattr(pipeline, "_second_opinion", lambda *_: replace(nothing_found(), verdict="parameter"))
     found = diagnose(scenario(), recorded({}, 3, speeds=(2.0,)), **stated)
     assert found.verdict == ("parameter" if second else first)
-    assert yielding == [not stated]  # a search by noise may end early only where another follows in any case
 
 
 @pytest.fixture(scope="module")

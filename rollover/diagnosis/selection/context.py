@@ -15,10 +15,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Inquiry:
-    """What every step of a selection is made with: recordings, effects, what is held out in turn, and who works.
-
-    `yields` says that what nothing explains is judged again beside an estimated discrepancy, by another search.
-    """
+    """What every step of a selection is made with: recordings, effects, what is held out in turn, and who works."""
 
     problem: Problem
     candidates: Sequence[Candidate]
@@ -26,7 +23,6 @@ class Inquiry:
     phases: Phases
     say: Progress
     executor: Executor
-    yields: bool = False
 
     def free(self, current: Fitted) -> list[Candidate]:
         """Candidates that an explanation does not hold yet."""

@@ -76,15 +76,13 @@ class Explanation:
 def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     """Forward selection of up to three effects, each beyond chance, then each tried without and against its rivals.
 
-    Where that ends with less than all, the way down is explained first, and effects are tried two by two; but not where
-    no combination of effects comes down to noise and another search follows (`Inquiry.yields`).
+    Where that ends with less than all, the way down is explained first, and effects are tried two by two.
     """
     problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
     found = loading_first(inquiry, forward_selection(inquiry, base))
     base, taken, left, current = found.base, list(found.steps), found.left, found.fitted
     is_whole = is_enough(problem, current, left)
-    is_searched = problem.effort.is_ensemble or found.paired or found.out_of_reach
-    is_open = not is_searched and (not is_whole or len(taken) == MOST_EFFECTS)
+    is_open = not (problem.effort.is_ensemble or found.paired) and (not is_whole or len(taken) == MOST_EFFECTS)
     if found.first is not None and is_open:
         # two that leave what chance leaves are preferred to three that do
         both = best_subsets(inquiry, taken or [found.first], found.at_first, current, is_whole=is_whole)

@@ -43,7 +43,7 @@ class ScoreTest:
     far as the misfit goes along them. Thresholds have no such way and are not in it. `only` are the recordings that all
     candidates were looked at in; empty for all. `leading` are candidates to be tried whatever they score, and `far`
     where some of them begin that have to be strong. `both` are two that may gain much together, and where they begin,
-    the best pair first. `outside` is the sum of squares of the misfit that no combination of all directions takes.
+    the best pair first.
     """
 
     score: float
@@ -56,7 +56,6 @@ class ScoreTest:
     far: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
     places: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
     both: tuple[tuple[Place, Place], ...] = ()
-    outside: float = 0.0
 
     @property
     def best(self) -> str:
@@ -134,14 +133,13 @@ def score_test(
         start = followed(c, x, float(along[k]) / sizes[k])
         if start is not None and len(ways.setdefault(c.key, [])) < TUNING.ways:
             ways[c.key].append(start)
-    cosines, pulls = D.T @ D, D.T @ misfit
+    cosines = D.T @ D
     both = []
     for pair in [] if problem.effort.is_ensemble else best_direction_pairs(along, cosines, [c.key for c, _ in seen_at]):
         one, other = (
             _scaled_start(*seen_at[k], far / sizes[k]) for k, far in zip(pair.places, pair.along, strict=True)
         )
         both.append((one, other))
-    inside = float(pulls @ np.linalg.pinv(cosines, rcond=TUNING.jitter, hermitian=True) @ pulls)
     return ScoreTest(
         score=float(scores.max()),
         scores=own_best,
@@ -151,7 +149,6 @@ def score_test(
         only=tuple(only or ()),
         places={key: tuple(each[: TUNING.close_places]) for key, each in places.items()},
         both=tuple(both),
-        outside=float(misfit @ misfit) - inside,
     )
 
 

@@ -41,7 +41,7 @@ class Taken:
 
     `first` is the first step, taken or not; `at_first` what all candidates scored beside the base, `looked` beside the
     last fit; `refuted` whether the best candidate's gain did not outlast the scatter of its own runs; `paired` whether
-    all were tried two by two; `out_of_reach` whether no combination of effects comes down to noise.
+    all were tried two by two.
     """
 
     base: Fitted
@@ -54,7 +54,6 @@ class Taken:
     looked: ScoreTest
     refuted: bool = False
     paired: bool = False
-    out_of_reach: bool = False
 
     @property
     def count(self) -> int:
@@ -90,7 +89,7 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
         current = taken[-1].fitted
         left = mismatch_of(problem.dataset, current.blocks, phases)
         looked = beside(current, left)
-    refuted = paired = out_of_reach = False
+    refuted = paired = False
     for _ in range(SETTINGS.selection.flexibility.most_effects - len(begun)):
         if is_tolerated(problem, current):
             break
@@ -134,9 +133,6 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
         if is_lost or is_over_flexible(current.effects):
             break
         looked = beside(current, left)
-        out_of_reach = inquiry.yields and is_out_of_reach(current, looked)
-        if out_of_reach:
-            break
     if not problem.heavy_tailed:
         problem.heavy_tailed, current = True, problem.again(current)
         left = mismatch_of(problem.dataset, current.blocks, phases)
@@ -151,21 +147,6 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
         looked=looked,
         refuted=refuted,
         paired=paired,
-        out_of_reach=out_of_reach,
-    )
-
-
-def is_out_of_reach(current: Fitted, looked: ScoreTest) -> bool:
-    """Whether no combination of effects brings what a fit leaves down to noise: most of it is in none's direction.
-
-    `looked` is the look beside that fit. The best of all combinations, of any strengths, leaves what is outside of all
-    directions, as far as slopes hold; as they may not, it must be more than all that could be taken.
-    """
-    count = sum(b.residual.size for b in current.blocks)
-    outside = looked.outside - count
-    return (
-        looked.outside > SETTINGS.selection.forward_step.nearly_noise** 2 * count
-        and outside > TUNING.outside_share * (current.left - count)
     )
 
 

@@ -33,12 +33,10 @@ ENDS = (1.0 - SETTINGS.data.phases.around_peak, *TUNING.later_ends)
 def loading_first(inquiry: Inquiry, found: Taken) -> Taken:
     """What was found, or a better one begun with what explains the way down alone; only where much is left."""
     problem, base = inquiry.problem, found.base
-    is_near = found.fitted.left < SETTINGS.selection.stepwise.hopeless**2 * found.count
-    if problem.effort.is_ensemble or found.out_of_reach or is_near:
+    if problem.effort.is_ensemble or found.fitted.left < SETTINGS.selection.stepwise.hopeless**2 * found.count:
         return found
     if rebound_residual(inquiry, base) < TUNING.least_share * (found.fitted.left - found.count):
         return found  # it came to rest as the simulation does, wherever that was
-    inquiry = replace(inquiry, yields=False)
     steps: Sequence[Step] = ()
     for end in ENDS:
         above = _until(inquiry, end, steps)

@@ -178,8 +178,6 @@ class Stepwise:
     # share of the first excess misfit that two effects leave: above it no exchange of one helps; chosen
     hopeless_share: float = 0.7
     hopeless: float = 2.0  # misfit over the noise: above it much is left; chosen
-    # share of the excess misfit that no combination takes: above it not even the best of all halves that; chosen
-    outside_share: float = 0.5
     # shares of the first excess misfit (drops, full runs): above, what is left is much where noise is little; chosen
     little_noise: tuple[float, ...] = (0.1, 0.01)
 
