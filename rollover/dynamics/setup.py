@@ -192,9 +192,8 @@ def _lash(
 ) -> None:
     for i, lashing in enumerate(lashings, first):
         if lashing.body not in row:
-            raise InputError(
-                Fault(path=f"initiation.lashings.{lashing.name}.body", message="no such body, got a vehicle without it")
-            )
+            message = f"no such body, got {lashing.body!r}, which the vehicle lacks; {' or '.join(row)}"
+            raise InputError(Fault(path=f"initiation.lashings.{lashing.name}.body", message=message))
         b = row[lashing.body]
         anchor = world_point(start, bodies, row["chassis"], lashing.anchor)
         length = float(np.linalg.norm(world_point(start, bodies, b, lashing.point) - anchor))

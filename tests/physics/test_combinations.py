@@ -22,6 +22,10 @@ SCENARIOS = [p.stem for p in sorted(SHELF.glob("*.yaml")) if isinstance(load(p).
 VEHICLES = [p.stem for p in sorted(SHELF.glob("vehicles/*.yaml"))]
 BRIEF = {"simulation.duration": 0.02}  # s: a start and some steps
 WITHOUT_WHEELS = {"rops_drop", "static_rops_test", "tractor_drop_corner"}  # what a rig without wheels can do
+# of these no balance is found across 23 degrees with the lower wheels at the flange: refused
+TALL = {"compact_tractor", "compact_tractor_folded", "electric_tractor", "large_tractor", "row_crop_tractor"}
+TALL |= {"utility_tractor", "utility_tractor_tubes"}
+WITHOUT_AXLE = {"mini_excavator", "quad_bike", "side_by_side"}  # their front wheels are bodies of no axle
 
 
 def expected(scenario: str, vehicle: str) -> str:
@@ -30,6 +34,12 @@ def expected(scenario: str, vehicle: str) -> str:
         return "loads a ROPS, got a vehicle without; one with members"
     if vehicle in ("acrylic_cube", "rops_rig", "skid_load") and scenario not in WITHOUT_WHEELS:
         return "got 0 "
+    if vehicle in TALL and scenario == "dolly_rollover":
+        return "does not stand on this surface"
+    if vehicle in WITHOUT_AXLE and scenario == "pendulum":
+        return "no such body, got 'front"
+    if (vehicle, scenario) == ("quad_bike", "static_rops_test"):
+        return "initiation.code: does not follow from the vehicle, got a track of 0.92 m, 289 kg"
     if (vehicle, scenario) == ("rops_rig", "static_rops_test"):
         return "initiation.code: does not follow from the vehicle, got no track, 3000 kg"
     return ""

@@ -19,7 +19,7 @@ import rollover as ro
 from rollover.assessment import standing
 from rollover.assessment.results import plain
 from rollover.calibration import identification
-from rollover.calibration import json_of as calibrated
+from rollover.calibration import io as calibrated
 from rollover.cli.main import app
 from rollover.comparison import compared
 from rollover.diagnosis import json_of as diagnosed
