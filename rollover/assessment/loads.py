@@ -13,7 +13,7 @@ from rollover.dynamics.validity import flag_names
 from rollover.recording import Recording
 from rollover.recording.filters import filtered
 from rollover.spec.channels import describe
-from rollover.system.numbers import brief, percent
+from rollover.system.numbers import percent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,17 +124,20 @@ def leading(peaks: Sequence[PeakLoad]) -> PeakLoad | None:
 
 def converged(peaks: Sequence[PeakLoad]) -> str:
     """A sentence if the leading load moves by no more than `CONVERGED` at half the step, otherwise nothing."""
-    peak = leading(peaks)
-    if peak is None or peak.half_step_change is None or peak.half_step_change > CONVERGED:
-        return ""
-    change = percent(peak.half_step_change)
-    return f"converged: half the step changes {peak.channel} (CFC {peak.cfc}) by {change}, at most 2 % is allowed"
+    is_converged, said = _at_half_step(peaks)
+    return f"converged: {said}, at most 2 % is allowed" if is_converged else ""
 
 
 def unconverged(peaks: Sequence[PeakLoad]) -> str:
     """A sentence if the leading load moves by more than `CONVERGED` at half the step, otherwise nothing."""
+    is_converged, said = _at_half_step(peaks)
+    return f"not converged: {said}, more than 2 %" if said and not is_converged else ""
+
+
+def _at_half_step(peaks: Sequence[PeakLoad]) -> tuple[bool, str]:
+    """Whether the leading load moves by no more than `CONVERGED`, and by how much; False and nothing if not known."""
     peak = leading(peaks)
-    if peak is None or peak.half_step_change is None or peak.half_step_change <= CONVERGED:
-        return ""
-    change = 100.0 * peak.half_step_change
-    return f"not converged: half the step changes {peak.channel} (CFC {peak.cfc}) by {brief(change)} %, more than 2 %"
+    if peak is None or peak.half_step_change is None:
+        return False, ""
+    said = f"half the step changes {peak.channel} (CFC {peak.cfc}) by {percent(peak.half_step_change)}"
+    return peak.half_step_change <= CONVERGED, said

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from rollover.spec.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Row = tuple[list[int], list[float]]
+Point = tuple[float, float, float]
 
 
 def link_rows(
@@ -30,7 +32,7 @@ def link_rows(
     occupant, out = vehicle.occupant, 3 * len(PARTS)
     rows: list[Row] = []
 
-    def about(body: str, point: tuple[float, float, float]) -> list[float]:
+    def about(body: str, point: Point) -> list[float]:
         return [float(c) for c in np.array(point) - bodies[row[body]].centre]
 
     if (belt := occupant.belt) is not None:
@@ -55,10 +57,13 @@ def link_rows(
 
 
 def _touching(
-    scenario: Scenario, vehicle: Vehicle, occupant: Occupant, row: dict[str, int], about: object
+    scenario: Scenario,
+    vehicle: Vehicle,
+    occupant: Occupant,
+    row: dict[str, int],
+    about: Callable[[str, Point], list[float]],
 ) -> list[Row]:
     """Spheres against boxes and tubes; the hips stand in the cushion by their weight over its stiffness."""
-    assert callable(about)
     sag = occupant.mass * scenario.gravity / occupant.cushion_stiffness
     found: list[Row] = []
     for pair in pairs(occupant, vehicle.outline, vehicle.rops):

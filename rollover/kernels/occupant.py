@@ -49,13 +49,19 @@ def try_links(t: Any, Q: Any) -> None:
 
 
 @leaf
+def seen_from(under: Any, upper: Any, r: Any, found: Any) -> None:
+    """A point r about b, in the axes of a and about its centre, into `found` (3,)."""
+    x, y, z = place(upper, r[0], r[1], r[2])
+    found[0], found[1], found[2] = to_body(under, x - under[X], y - under[X + 1], z - under[X + 2])
+
+
+@leaf
 def try_joint(t: Any, i: int, room: Any, Q: Any) -> None:
     """Springs along and about a's axes; stops beyond the range of each angle of the rotation vector."""
     turn, rates, moved, force, local = room[0], room[1], room[2], room[3], room[4]
     f, g, b, a = t.link_f[i], t.link_memory[i], t.link_i[i, 1], t.link_i[i, 2]
     under, upper, r = t.pose[a], t.pose[b], f[L_B : L_B + 3]
-    x, y, z = place(upper, r[0], r[1], r[2])
-    local[0], local[1], local[2] = to_body(under, x - under[X], y - under[X + 1], z - under[X + 2])
+    seen_from(under, upper, r, local)
     v, w = velocity(upper, r[0], r[1], r[2]), velocity(under, local[0], local[1], local[2])
     rate = to_body(under, v[0] - w[0], v[1] - w[1], v[2] - w[2])
     x, y, z = spin(upper)
@@ -102,8 +108,7 @@ def try_strap(t: Any, i: int, room: Any, Q: Any) -> None:
     force[0], force[1], force[2] = -tension * x / length, -tension * y / length, -tension * z / length
     torque[0], torque[1], torque[2] = 0.0, 0.0, 0.0
     # the pull acts along the line between both ends: as good at one as at the other
-    x, y, z = place(upper, r[0], r[1], r[2])
-    way[0], way[1], way[2] = to_body(under, x - under[X], y - under[X + 1], z - under[X + 2])
+    seen_from(under, upper, r, way)
     add_between(under, a, way, upper, b, r, force, torque, Q)
     g[HELD_NOW], g[POWER_NOW], g[L_FORCE] = 0.5 * f[L_K] * e * e, (tension - f[L_K] * e) * rate, tension
 
@@ -150,8 +155,7 @@ def try_touch(t: Any, i: int, room: Any, Q: Any) -> None:
     c, p, n, force, on_b = room[0], room[1], room[2], room[3], room[4]
     f, g, b, a = t.link_f[i], t.link_memory[i], t.link_i[i, 1], t.link_i[i, 2]
     under, upper, r = t.pose[a], t.pose[b], f[L_B : L_B + 3]
-    x, y, z = place(upper, r[0], r[1], r[2])
-    c[0], c[1], c[2] = to_body(under, x - under[X], y - under[X + 1], z - under[X + 2])
+    seen_from(under, upper, r, c)
     depth = nearest(t.link_i[i, 0], f, c, p, n)
     g[HELD_NOW], g[POWER_NOW] = 0.0, 0.0
     g[L_FORCE], g[L_FORCE + 1], g[L_FORCE + 2] = 0.0, 0.0, 0.0
@@ -173,8 +177,7 @@ def try_touch(t: Any, i: int, room: Any, Q: Any) -> None:
 @leaf
 def touch_rates(under: Any, upper: Any, p: Any, n: Any, on_b: Any) -> Any:
     """Rate of the depth and sliding velocity (a's axes) where b touches a at p; that place about b into `on_b`."""
-    x, y, z = place(under, p[0], p[1], p[2])
-    on_b[0], on_b[1], on_b[2] = to_body(upper, x - upper[X], y - upper[X + 1], z - upper[X + 2])
+    seen_from(upper, under, p, on_b)
     v, w = velocity(upper, on_b[0], on_b[1], on_b[2]), velocity(under, p[0], p[1], p[2])
     u = to_body(under, v[0] - w[0], v[1] - w[1], v[2] - w[2])
     out = u[0] * n[0] + u[1] * n[1] + u[2] * n[2]
@@ -225,8 +228,7 @@ def stiffen_joint(t: Any, i: int, f: float, fd: float, J: Any, room: Any, K: Any
     """Springs along and about a's axes, a stop where it is met."""
     n, b, a, turn, local = t.link_f[i], t.link_i[i, 1], t.link_i[i, 2], room[0], room[1]
     under, upper, r = t.pose[a], t.pose[b], n[L_B : L_B + 3]
-    x, y, z = place(upper, r[0], r[1], r[2])
-    local[0], local[1], local[2] = to_body(under, x - under[X], y - under[X + 1], z - under[X + 2])
+    seen_from(under, upper, r, local)
     relative_turn(under, upper, turn)
     for k in range(3):
         x, y, z = under[ROT + k], under[ROT + 3 + k], under[ROT + 6 + k]
@@ -268,8 +270,7 @@ def stiffen_touch(t: Any, i: int, f: float, fd: float, J: Any, room: Any, K: Any
     c, p, m, on_b = room[0], room[1], room[2], room[4]
     n, b, a = t.link_f[i], t.link_i[i, 1], t.link_i[i, 2]
     under, upper, r = t.pose[a], t.pose[b], n[L_B : L_B + 3]
-    x, y, z = place(upper, r[0], r[1], r[2])
-    c[0], c[1], c[2] = to_body(under, x - under[X], y - under[X + 1], z - under[X + 2])
+    seen_from(under, upper, r, c)
     depth = nearest(t.link_i[i, 0], n, c, p, m)
     rate, slide = touch_rates(under, upper, p, m, on_b)
     speed = math.sqrt(slide[0] * slide[0] + slide[1] * slide[1] + slide[2] * slide[2])

@@ -23,8 +23,8 @@ VEHICLES = [p.stem for p in sorted(SHELF.glob("vehicles/*.yaml"))]
 BRIEF = {"simulation.duration": 0.02}  # s: a start and some steps
 WITHOUT_WHEELS = {"rops_drop", "static_rops_test", "tractor_drop_corner"}  # what a rig without wheels can do
 # of these no balance is found across 23 degrees with the lower wheels at the flange: refused
-TALL = {"compact_tractor", "compact_tractor_folded", "electric_tractor", "large_tractor", "row_crop_tractor"}
-TALL |= {"utility_tractor", "utility_tractor_tubes"}
+UNBALANCED = {"compact_tractor", "compact_tractor_folded", "electric_tractor", "large_tractor", "row_crop_tractor"}
+UNBALANCED |= {"utility_tractor", "utility_tractor_tubes"}
 WITHOUT_AXLE = {"mini_excavator", "quad_bike", "side_by_side"}  # their front wheels are bodies of no axle
 
 
@@ -34,7 +34,7 @@ def expected(scenario: str, vehicle: str) -> str:
         return "loads a ROPS, got a vehicle without; one with members"
     if vehicle in ("acrylic_cube", "rops_rig", "skid_load") and scenario not in WITHOUT_WHEELS:
         return "got 0 "
-    if vehicle in TALL and scenario == "dolly_rollover":
+    if vehicle in UNBALANCED and scenario == "dolly_rollover":
         return "does not stand on this surface"
     if vehicle in WITHOUT_AXLE and scenario == "pendulum":
         return "no such body, got 'front"

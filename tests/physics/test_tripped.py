@@ -59,7 +59,7 @@ def test_in_a_ditch_it_leans_as_the_depth_says() -> None:
     )
     rec = done(base).recording
     lean = math.degrees(-rec["chassis/roll"][rec.time > 2.2].mean())
-    assert lean == pytest.approx(math.degrees(math.asin(0.4 / 1.5)), abs=1.5)
+    assert lean == pytest.approx(math.degrees(math.asin(0.4 / 1.5)), abs=0.6)  # 15.0: 10 mm of sinkage more are 0.4
 
 
 @pytest.mark.parametrize(("depth", "over"), [(0.4, False), (1.1, True)])
@@ -171,7 +171,7 @@ def test_the_dolly_stops_as_the_standard_says() -> None:
     assert np.sum(a <= -20.0 * 9.80665) * (t[1] - t[0]) > 0.04
     bank, platform, flange = to_mapping(scenario)["ground"]["surface"]["parts"]
     assert math.degrees(math.atan(platform["height"] / platform["length"])) == pytest.approx(23.0, abs=0.02)
-    assert (bank["height"], flange["height"]) == pytest.approx((9.0 * INCH, 4.0 * INCH), abs=1e-3)
+    assert (bank["height"], flange["height"]) == pytest.approx((9.0 * INCH, 4.0 * INCH), abs=1e-3)  # given in mm
 
 
 def test_without_a_flange_it_leaves_the_dolly_at_its_speed() -> None:
@@ -232,4 +232,4 @@ def test_a_higher_battery_tips_earlier() -> None:
         lean.append(-rec["chassis/roll"][0])
     centre = [(2730.0 * 0.79 + 500.0 * z) / 3230.0 for z in (0.5, 1.2)]
     rigid = [math.atan(S / h) for h in centre]
-    assert lean[0] - lean[1] == pytest.approx(rigid[0] - rigid[1], rel=0.25)
+    assert lean[0] - lean[1] == pytest.approx(rigid[0] - rigid[1], rel=0.08)  # tyres add 5 %

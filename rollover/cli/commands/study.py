@@ -115,6 +115,14 @@ def _made(report: dict[str, Any]) -> list[str]:
     return [*lines, said] if said else lines
 
 
+def _limit(e: Mapping[str, Any], unit: str) -> str:
+    """The limit of an output, for people."""
+    from rollover.cli.console import readable
+    from viz.pages.report import series_unit
+
+    return f"{readable(e['limit'], unit)} {series_unit(unit)[0].removeprefix('1')}".rstrip()
+
+
 def sentences(report: dict[str, Any]) -> list[str]:
     """The report in a few lines."""
     from rollover.assessment.ledger import of_cases
@@ -135,18 +143,18 @@ def sentences(report: dict[str, Any]) -> list[str]:
             low, value, high = (readable(q[key], each["unit"]) for key in ("low", "value", "high"))
             lines.append(f"  {100.0 * q['q']:5.4g} %  {value:>9}   ({low} to {high})")
         if (e := each["exceedance"]) is not None:
-            limit = f"{readable(e['limit'], each['unit'])} {unit.removeprefix('1')}".rstrip()
             span = f"({100.0 * e['low']:.3g} to {100.0 * e['high']:.3g} %)"
-            lines.append(f"  probability {e['beyond']} {limit}: {100.0 * e['probability']:.3g} %  {span}")
+            lines.append(
+                f"  probability {e['beyond']} {_limit(e, each['unit'])}: {100.0 * e['probability']:.3g} %  {span}"
+            )
             if e["failed"]:
                 none, every = f"{100.0 * e['least']:.3g} %", f"{100.0 * e['most']:.3g} %"
                 span = f"({100.0 * e['low_of_all']:.3g} to {100.0 * e['high_of_all']:.3g} %)"
                 low = f"  with {e['failed']} failed cases as not {e['beyond']}: {none}"
                 lines.append(f"{low}, as {e['beyond']}: {every}  {span}")
         if (e := each["beyond_limit"]) is not None:
-            limit = f"{readable(e['limit'], each['unit'])} {unit.removeprefix('1')}".rstrip()
             failed = f", {e['failed']} failed" if e["failed"] else ""
-            lines.append(f"  {e['beyond']} {limit}: {e['hits']} of {e['cases']} cases{failed}")
+            lines.append(f"  {e['beyond']} {_limit(e, each['unit'])}: {e['hits']} of {e['cases']} cases{failed}")
         for s in each["sobol"]:
             total = f"total {s['total']:.2f} +- {s['total_half_width']:.2f}"
             lines.append(f"  {s['axis']}: first {s['first']:.2f} +- {s['first_half_width']:.2f}, {total}")

@@ -37,10 +37,11 @@ def rails(t: Trace, unit: str, stated: set[float]) -> Iterator[Finding]:
         extreme = float(x.max())
         if extreme <= 0.0 or any(abs(sign * extreme - value) <= EXACT * abs(value) for value in stated):
             continue
-        at = _peaks_at(x, extreme)
+        digit = digit_of(x)
+        at = _peaks_at(x, extreme, digit)
         if not at.size:
             continue
-        expected = _expected(x, extreme)
+        expected = _expected(x, extreme, digit)
         count = at.size if _holds(x, extreme) else int(np.sum(np.abs(x - extreme) <= EXACT * extreme))
         expected *= SMOOTH if count > at.size else 1.0
         by_chance = float(pdtrc(count - 2, expected)) if count > 1 else 1.0
@@ -48,7 +49,7 @@ def rails(t: Trace, unit: str, stated: set[float]) -> Iterator[Finding]:
         if by_chance < CHANCE:
             peaks = f"{at.size} separate peaks end" if at.size > 1 else f"its peak ends, in {count} samples,"
             what = f"{peaks} at exactly {value:.6g} {unit}"
-        elif unit != ANGLES and (full := _full_scale(extreme, digit_of(x), unit)) and _stands_over(x, extreme):
+        elif unit != ANGLES and (full := _full_scale(extreme, digit, unit)) and _stands_over(x, extreme):
             what = f"its peak reads exactly {'-' if sign < 0.0 else ''}{full}, a full scale's round number"
         else:
             continue
@@ -90,7 +91,7 @@ def _shared(channel: str, sign: float, there: Mapping[str, Trace]) -> Iterator[t
         highest = top >= (1.0 - EXACT) * max(tops.values())
         if not highest:
             continue
-        expected = max(_expected(sign * t.values, top) for t in different)
+        expected = max(_expected(x, top, digit_of(x)) for x in (sign * t.values for t in different))
         # the first says where, each other one has to meet it with one of its own highest values
         if float(expected ** (len(different) - 1)) >= CHANCE:
             continue
@@ -124,14 +125,14 @@ def _different(traces: Sequence[Trace]) -> list[Trace]:
     return found
 
 
-def _peaks_at(x: Array, extreme: float) -> NDArray[np.int64]:
+def _peaks_at(x: Array, extreme: float, digit: float) -> NDArray[np.int64]:
     """First samples of the runs at the extreme that begin and end inside, with a step larger than a digit."""
     there = np.abs(x - extreme) <= EXACT * extreme
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
     starts, ends = edges[::2], edges[1::2]
     inside = (starts > 0) & (ends < x.size)
     starts, ends = starts[inside], ends[inside]
-    least = 1.5 * digit_of(x)
+    least = 1.5 * digit
     steep = (extreme - x[starts - 1] > least) & (extreme - x[ends] > least)
     return np.asarray(starts[steep])
 
@@ -142,12 +143,12 @@ def _holds(x: Array, extreme: float) -> bool:
     return bool(np.any(same & (x[1:] != 0.0) & (np.abs(x[1:] - extreme) > EXACT * extreme)))
 
 
-def _expected(x: Array, extreme: float) -> float:
+def _expected(x: Array, extreme: float, digit: float) -> float:
     """How many values share the digit of the largest by chance."""
     below = np.sort(x[extreme - x > EXACT * extreme])[-BELOW:]
     if below.size < BELOW:
         return math.inf
-    return BELOW * digit_of(x) / float(extreme - below[0])
+    return BELOW * digit / float(extreme - below[0])
 
 
 def _stands_over(x: Array, extreme: float) -> bool:

@@ -102,15 +102,14 @@ def _of_force(
         if ratio < TOO_LITTLE:
             what = f"holds {between:.3g} N s up to the greatest depth, where {mass:.4g} kg at {speed:.3g} m/s have"
             return _finding(t, (stop[0], stop[2]), ratio, f"{what} {least:.3g}: kN taken for N")
-    where = _pulse(t)
-    if where is None:
+    if (pulse := _pulse(t)) is None:
         return None
-    impulse = float(np.trapezoid(t.values[where], t.time[where]))
-    most = 2.0 * least + mass * gravity * float(t.time[where][-1] - t.time[where][0])
+    impulse, span = pulse
+    most = 2.0 * least + mass * gravity * (span[1] - span[0])
     if impulse < TOO_MUCH * most:
         return None
     what = f"its pulse holds {impulse:.3g} N s, where {most:.3g} are possible"
-    return _finding(t, (t.time[where][0], t.time[where][-1]), impulse / most, f"{what}: N taken for kN")
+    return _finding(t, span, impulse / most, f"{what}: N taken for kN")
 
 
 def _of_acceleration(t: Trace, stop: tuple[float, float, float] | None, speed: float) -> Finding | None:
@@ -119,16 +118,15 @@ def _of_acceleration(t: Trace, stop: tuple[float, float, float] | None, speed: f
         if G_LOW < ratio < G_HIGH:
             what = f"changes the speed by {between:.3g} m/s up to the greatest depth, where {speed:.3g} is lost"
             return _finding(t, (stop[0], stop[2]), ratio, f"{what}: g taken for m/s2")
-    where = _pulse(t)
-    if where is None:
+    if (pulse := _pulse(t)) is None:
         return None
-    change = float(np.trapezoid(t.values[where], t.time[where]))
+    change, span = pulse
     ratio = change / (2.0 * speed)
     if not ratio > IMPOSSIBLE:
         return None
     means = "m/s2 taken for g" if ratio < TOO_MUCH else "stamps in ms taken for s, or another unit"
     what = f"its pulse changes the speed by {change:.3g} m/s, where {2.0 * speed:.3g} are possible"
-    return _finding(t, (t.time[where][0], t.time[where][-1]), ratio, f"{what}: {means}")
+    return _finding(t, span, ratio, f"{what}: {means}")
 
 
 def _integral(t: Trace, start: float, end: float) -> float | None:
@@ -139,8 +137,10 @@ def _integral(t: Trace, start: float, end: float) -> float | None:
     return float(np.trapezoid(t.values[inside], t.time[inside]))
 
 
-def _pulse(t: Trace) -> slice | None:
-    """The stretch about the largest value that stays above a part of it, both ends inside the record; None if none."""
+def _pulse(t: Trace) -> tuple[float, tuple[float, float]] | None:
+    """Integral over the stretch about the largest value that stays above a part of it and ends inside the record, and
+    when that begins and ends; None if there is none.
+    """
     top = int(np.argmax(t.values))
     peak = float(t.values[top])
     if peak < CLEAR * t.floor.sigma:
@@ -151,7 +151,9 @@ def _pulse(t: Trace) -> slice | None:
     is_over = after.size > 0 or float(t.values[-FEWEST:].max()) < OVER * peak
     if not before.size or not is_over or end - before[-1] - 2 < FEWEST:
         return None
-    return slice(int(before[-1]), end)
+    where = slice(int(before[-1]), end)
+    span = float(t.time[where][0]), float(t.time[where][-1])
+    return float(np.trapezoid(t.values[where], t.time[where])), span
 
 
 def _gravity_included(traces: Mapping[str, Trace], gravity: float, proper: set[str]) -> Iterator[Finding]:

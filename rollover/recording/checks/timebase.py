@@ -66,12 +66,12 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
         return
     beyond = -float(ndtri(0.5 * CHANCE / t.values.size / len(SIDES)))
     places: dict[int, tuple[float, float, float]] = {}
-    for side in reversed(SIDES):  # the longest first, which tells best how many
-        if t.values.size < 4 * side:
-            continue
-        leap, way, bend, error, slope = _across(t, side)
-        # where the error hides a sample's way, a whole number of samples says nothing for a jump
-        bend += np.where(error * SAMPLES < np.abs(way), 0.0, _bends(t, side, leap, error))
+    fits = {side: _across(t, side) for side in SIDES if t.values.size >= 4 * side}
+    for side in reversed(fits):  # the longest first, which tells best how many
+        leap, way, bend, error, slope = fits[side]
+        if (shorter := fits.get(side // 2)) is not None:
+            # where the error hides a sample's way, a whole number of samples says nothing for a jump
+            bend = bend + np.where(error * SAMPLES < np.abs(way), 0.0, _bends(leap, error, shorter[0], shorter[3]))
         number = leap / np.where(way == 0.0, np.inf, way)
         whole = np.round(number)
         doubt = np.hypot(error, whole * slope) / np.maximum(np.abs(way), 1e-300)
@@ -104,15 +104,12 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
     )
 
 
-def _bends(t: Trace, side: int, leap: Array, error: float) -> Array:
+def _bends(leap: Array, error: float, half: Array, wide: float) -> Array:
     """Infinite where a parabola through half as many samples says another jump: a bend among them feigns it, (n - 1,).
 
     The difference of nested fits has the shorter's variance less the longer one's; two deviations of it are let pass:
     1 of 20 true jumps is left to another length.
     """
-    if side == SIDES[0]:
-        return np.zeros_like(leap)
-    half, _, _, wide, _ = _across(t, side // 2)
     return np.where(np.abs(half - leap) < 2.0 * math.sqrt(wide * wide - error * error), 0.0, np.inf)
 
 
