@@ -66,7 +66,7 @@ class Sensor:
 
 @dataclass(frozen=True, kw_only=True)
 class Recording:
-    """Channels (see `channels.CHANNELS`), SI, one value each per time stamp; gaps are NaN.
+    """Channels (see `channels.CHANNELS`), SI, one value each per time stamp, 64-bit; gaps are NaN.
 
     `time` (n,) strictly increasing, s; `channels` name -> (n,); `noise` name -> 1 sigma; `cfc` name -> class
     of the filter already applied; `conditions` scenario path -> value this was run with, `uncertainty` the same
@@ -87,6 +87,11 @@ class Recording:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        # files hold shorter and longer numbers, of which the tables that keep them know not all
+        object.__setattr__(self, "time", np.asarray(self.time, dtype=np.float64))
+        if any(v.dtype != np.float64 for v in self.channels.values()):
+            as_kept = {name: v.astype(np.float64) for name, v in self.channels.items()}
+            object.__setattr__(self, "channels", as_kept)
         if self.time.ndim != 1 or self.time.size == 0:
             raise ValueError(f"time: empty or not one column, got shape {self.time.shape}; at least one stamp")
         if not np.all(np.diff(self.time) > 0):

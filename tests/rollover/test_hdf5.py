@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.recording.importers import read_recording
+from rollover.recording.importers import read_recording, write_recording
 from rollover.system.errors import InputError
 from tests.rollover.foreign import CASES, FORCE, SINKAGE, left_out, named, needs, peak
 
@@ -309,3 +309,18 @@ def test_all_that_a_file_holds_is_counted(tmp_path: Path) -> None:
 def test_a_profiles_time_comes_before_an_attributes_step(tmp_path: Path) -> None:
     assert force(tmp_path / "a.h5", TIME, dt=0.09).time == pytest.approx(TIME)
     assert named(tmp_path / "a.h5", {"F": FORCE}).time == pytest.approx(0.09 * np.arange(6))
+
+
+@pytest.mark.parametrize("kind", ["f2", "f4", "f8", np.longdouble, "i8", "u1", ">f8", ">i2"])
+def test_numbers_of_any_length_are_read_and_kept(tmp_path: Path, kind: Any) -> None:
+    time, values = np.arange(6).astype(kind), np.arange(6)[::-1].astype(kind)
+    path = write(tmp_path / "a.h5", {"t": time, "F": values}, t={"units": "s"}, F={"units": "N"})
+    with h5py.File(path, "a") as file:
+        file["t"].make_scale("t")
+        file["F"].dims[0].attach_scale(file["t"])
+    found = named(path, {"F": FORCE})
+    for name in ("text.csv", "table.parquet"):
+        write_recording(found, tmp_path / name)
+        again = read_recording(tmp_path / name)
+        assert again.time.tolist() == np.arange(6).tolist()
+        assert again[FORCE].tolist() == np.arange(6)[::-1].tolist()
