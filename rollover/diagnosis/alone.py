@@ -14,7 +14,7 @@ from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.inference.repeated_course import predicted_by_others, quick_channels
 from rollover.diagnosis.inference.residual_law import fitted_law
-from rollover.diagnosis.probabilities import credible
+from rollover.diagnosis.probabilities import credible, log_evidence
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import Explanation, kind_of
@@ -65,14 +65,20 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
 
 
 def best_predictor(problem: Problem, one: Step, groups: Groups) -> Fitted:
-    """The fit that leads a step: its best, unless another predicts surely more of what conditions held out miss.
+    """The fit that leads a step: the most probable by (D24) of those that no other surely predicts more than.
 
-    Simplicity prefers what is hardly worse by the errors of samples; conditions are what tells beside a discrepancy.
+    Conditions held out tell first. Between what predicts them as well, the squares of all samples would prefer what
+    bends to the one channel that the discrepancy touches least; what is left of each channel counts alike.
     """
-    able = [f for f in one.rivals if not ends_at_bound(f)]
-    ahead = min(able, key=lambda f: held_out(f, groups).left.sum(), default=one.fitted)
-    more = share_beyond(problem, one.base, one.fitted, ahead, groups)
-    return one.fitted if more is None or more.low <= 0.0 else ahead
+    able = [one.fitted, *(f for f in one.rivals if not ends_at_bound(f) and f is not one.fitted)]
+    ahead = min(able, key=lambda f: held_out(f, groups).left.sum())
+
+    def is_behind(f: Fitted) -> bool:
+        more = share_beyond(problem, one.base, f, ahead, groups)
+        return more is not None and more.low > 0.0
+
+    level = [f for f in able if f is ahead or not is_behind(f)]
+    return max(level, key=lambda f: log_evidence(problem, f))
 
 
 def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:
@@ -110,7 +116,8 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
 
     That was estimated from what the best leaves, whose form need not be the right one: a rival that explains nearly all
     that the best does is not excluded where it leaves no more than the discrepancy, or is of the same family. Nor is
-    one that explains half as much and belongs to those that hold the right one with 95 % by what they leave, (D24).
+    one of those that hold the right one with 95 % by what they leave, (D24), if it explains half as much, or is of the
+    same family.
     """
     near = confusion(one, groups, problem.samples_per_error)
     best, start = one.fitted, float(held_out(one.base, groups).left.sum())
@@ -120,10 +127,10 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
         becomes_best = len(rival.x) > len(best.x) and ends_at_bound(rival)
         if becomes_best or any(rival is f for f in near):
             continue
-        is_as_near = is_tolerated(problem, rival) or rival.candidates[-1].family == best.candidates[-1].family
         gain = start - float(held_out(rival, groups).left.sum())
-        is_probable = gain > TUNING.half_share * most and any(rival is f for f in probable)
-        if (is_as_near and gain >= TUNING.nearly_all * most) or is_probable:
+        is_kin = rival.candidates[-1].family == best.candidates[-1].family
+        is_probable = (is_kin or gain > TUNING.half_share * most) and any(rival is f for f in probable)
+        if ((is_kin or is_tolerated(problem, rival)) and gain >= TUNING.nearly_all * most) or is_probable:
             near.append(rival)
     return near
 

@@ -111,15 +111,24 @@ def test_a_gain_is_one_draw_however_many_recordings_repeat_it() -> None:
     assert by_chance(base, [fitted("soil-layer", (1.9,) * DROPS)], looked, 10.0) > anew
 
 
+SURELY, MAYBE = (0.20, 0.22, 0.19, 0.21, 0.20, 0.18), (0.10, 0.50, 0.15, 0.45, 0.05, 0.30)
+
+
 @pytest.mark.parametrize(
-    ("left", "x", "leads"),
+    ("left", "x", "lag_is_probable", "leads"),
     [
-        ((0.20, 0.22, 0.19, 0.21, 0.20, 0.18), 0.5, "sensor-lag"),  # a tenth more, in each drop
-        ((0.20, 0.22, 0.19, 0.21, 0.20, 0.18), 1.0, "sensor-clock-offset"),  # at an end of its range
-        ((0.10, 0.50, 0.15, 0.45, 0.05, 0.30), 0.5, "sensor-clock-offset"),  # more, maybe by chance of the drops
+        (SURELY, 0.5, False, "sensor-lag"),  # a tenth more, in each drop
+        (SURELY, 1.0, True, "sensor-clock-offset"),  # at an end of its range
+        (MAYBE, 0.5, False, "sensor-clock-offset"),  # more, maybe by chance of the drops: what is left tells
+        (MAYBE, 0.5, True, "sensor-lag"),
+        ((0.9, 0.9, 0.9, 0.9, 0.9, 0.9), 0.5, True, "sensor-clock-offset"),  # surely less, whatever is left
     ],
 )
-def test_what_conditions_surely_prefer_leads(left: tuple[float, ...], x: float, leads: str) -> None:
+def test_conditions_tell_what_leads_then_what_is_left(
+    left: tuple[float, ...], x: float, lag_is_probable: bool, leads: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    probable = "sensor-lag" if lag_is_probable else "sensor-clock-offset"
+    monkeypatch.setattr(alone, "log_evidence", lambda _, f: float(f.candidates[-1].id == probable))
     simple = fitted("sensor-clock-offset", (0.30, 0.31, 0.29, 0.32, 0.30, 0.28))
     one = explanation(SOME, simple, fitted("sensor-lag", left, x=x)).parts[0]
     assert best_predictor(PROBLEM, one, GROUPS).candidates[-1].id == leads
@@ -146,8 +155,9 @@ def test_rivals_akin_or_within_the_discrepancy_are_kept(monkeypatch: pytest.Monk
         patch.setattr(alone, "credible", lambda _, fits: list(fits))
         offered = [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)]
         assert offered == ["soil-layer", *rivals]
-        half = explanation((100.0,) * DROPS, best, fitted("guide-friction", (51.0,) * DROPS)).parts[0]
-        assert [f.candidates[-1].id for f in alike_beside(PROBLEM, half, GROUPS)] == ["soil-layer"]
+        half = [fitted("guide-friction", (51.0,) * DROPS), fitted("soil-crust", (51.0,) * DROPS)]
+        less = explanation((100.0,) * DROPS, best, *half).parts[0]  # its kin are offered all the same
+        assert [f.candidates[-1].id for f in alike_beside(PROBLEM, less, GROUPS)] == ["soil-layer", "soil-crust"]
     # one that becomes the best at the end of its range is the best itself
     at_an_end = fitted("soil-crust", (0.6,) * DROPS, numbers=2, x=1.0)
     step = explanation((100.0,) * DROPS, fitted("soil-layer", (0.5,) * DROPS), at_an_end).parts[0]
