@@ -105,14 +105,19 @@ def diagnose(
     every = [e for e in every if e.name not in {one.dataset.name for one in wrong}]
     usable = without_inconsistent(every, some)
     first = concluded(asked, usable, [*some, *wrong], notes)
-    found = _answered(first, usable, notes)
-    if found.verdict == "unexplained" and shared:
-        # beside a factor so large what else is missing may be out of sight
-        other = _diagnosed(asked, without_inconsistent(every, [*some, *shared]), [*some, *shared, *wrong], notes)
-        found = other if other.effects else found
     is_open = estimate == "unexplained" and not (reference or stated or general > 0.0)
-    if found.verdict == "unexplained" and is_open and isinstance(first, Conclusion):
-        found = _second_opinion(first, usable, notes) or found
+    doubtful = first if is_open and isinstance(first, Conclusion) and first.verdict == "unexplained" else None
+    if doubtful is not None and not shared:
+        # what is said of a residual beside noise alone takes long, and is said only where nothing else is
+        found = _second_opinion(doubtful, usable, notes) or _answered(doubtful, usable, notes)
+    else:
+        found = _answered(first, usable, notes)
+        if found.verdict == "unexplained" and shared:
+            # beside a factor so large what else is missing may be out of sight
+            other = _diagnosed(asked, without_inconsistent(every, [*some, *shared]), [*some, *shared, *wrong], notes)
+            found = other if other.effects else found
+        if found.verdict == "unexplained" and doubtful is not None:
+            found = _second_opinion(doubtful, usable, notes) or found
     return checked(replace(found, clocks=zeros, seconds=clock.perf_counter() - began))
 
 
