@@ -1,4 +1,4 @@
-"""Probabilities over names, "nothing" and "not-listed" among them, by what each explanation leaves: (D23), (D24)."""
+"""Probabilities over names, "nothing" and "not-listed" among them, by what each explanation leaves: (D23) to (D25)."""
 
 from __future__ import annotations
 
@@ -21,12 +21,19 @@ COARSE = SCALES[:: TUNING.every]  # of two scales at once every few will do: the
 
 
 def probabilities(
-    problem: Problem, tried: Explanation, found: Explanation, candidates: int, *, is_noise: bool
+    problem: Problem,
+    tried: Explanation,
+    found: Explanation,
+    candidates: int,
+    *,
+    is_noise: bool,
+    p_value: float = 1.0,
 ) -> dict[str, float]:
     """Probability of each name to be what is mainly missing, the largest first; they add up to one.
 
     `tried` is what competed, `found` what was decided on, `candidates` how many effects could act. `is_noise` says that
     what `found` leaves is noise: samples tell then, else one draw of a discrepancy for all recordings.
+    `p_value` is that of the best effect's gain on conditions held out, by (D21).
     """
     log_evidence = _beside_noise(problem, tried, found) if is_noise else _beside_discrepancy(problem, tried)
     prior = {NOTHING: TUNING.nothing, NOT_LISTED: TUNING.not_listed}
@@ -35,6 +42,7 @@ def probabilities(
     for name, score in log_evidence:
         names.append(name)
         scores.append(score + np.log(prior.get(name, listed / max(candidates, 1))))
+    scores[0] = min(scores[0], most_for_nothing(p_value, scores[1:]))
     weight = np.exp(np.array(scores) - max(scores))
     weight /= weight.sum()
     summed: dict[str, float] = {}
@@ -76,6 +84,17 @@ def _beside_discrepancy(problem: Problem, tried: Explanation) -> Iterable[tuple[
     yield NOT_LISTED, sum(log_touched(v, resolution(problem, c)) for c, v in left.items())
     for f in tried.first.rivals if tried.first is not None else ():
         yield f.candidates[-1].id, log_evidence(problem, f)
+
+
+def most_for_nothing(p_value: float, others: Sequence[float]) -> float:
+    """The most that a p-value leaves of the log weight of "nothing", by those of all `others`, (D25).
+
+    The gain of the best effect on conditions held out tells more of "nothing" than what is left of each channel does.
+    """
+    if not 0.0 < p_value < np.exp(-1.0):
+        return np.inf if p_value > 0.0 else -np.inf
+    bound = np.log(-np.e * p_value * np.log(p_value))
+    return float(np.logaddexp.reduce(others) + np.log(TUNING.nothing / (1.0 - TUNING.nothing)) + bound)
 
 
 def log_evidence(problem: Problem, fitted: Fitted) -> float:

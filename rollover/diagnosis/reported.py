@@ -160,7 +160,8 @@ def _probabilities(c: Conclusion, *, remains: bool) -> dict[str, float]:
     if c.acts != "drop" or c.asked.scenario is None or c.shown is not None:
         return {}
     is_noise = not remains and c.problem.samples_per_error == 1.0
-    found = probabilities(c.problem, c.tried, c.explanation, len(c.candidates), is_noise=is_noise)
+    p_value = c.tried.first.p_value if c.is_beside and c.tried.first is not None else 1.0
+    found = probabilities(c.problem, c.tried, c.explanation, len(c.candidates), is_noise=is_noise, p_value=p_value)
     for slight in {e.id for e in c.slight} & found.keys():  # what is of no consequence is none worth a name
         found[NOTHING] += found.pop(slight)
     return dict(sorted(found.items(), key=lambda one: -one[1]))

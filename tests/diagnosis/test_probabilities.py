@@ -19,7 +19,9 @@ SIGNALS = [SimpleNamespace(channel=c, noise=0.003, span=1.0, rows=np.arange(400)
 PROBLEM = cast(Problem, SimpleNamespace(dataset=[SimpleNamespace(signals=SIGNALS)] * DROPS))
 
 
-def beside(monkeypatch: pytest.MonkeyPatch, nothing: float, each: dict[str, float]) -> dict[str, float]:
+def beside(
+    monkeypatch: pytest.MonkeyPatch, nothing: float, each: dict[str, float], p_value: float = 1.0
+) -> dict[str, float]:
     """Probabilities where nothing, and each effect, leaves so much (share of the range) of every channel."""
     left = {"": nothing, **each}
 
@@ -29,7 +31,20 @@ def beside(monkeypatch: pytest.MonkeyPatch, nothing: float, each: dict[str, floa
     monkeypatch.setattr(module, "residual_rms", residual_rms)
     best, *others = (fitted(id, (1.0,) * DROPS) for id in each)
     tried = explanation((2.0,) * DROPS, best, *others)
-    return probabilities(PROBLEM, tried, tried, 40, is_noise=False)
+    return probabilities(PROBLEM, tried, tried, 40, is_noise=False, p_value=p_value)
+
+
+def test_what_conditions_held_out_tell_bounds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two in five before, three in five for the others: odds of 2/3 times -e p ln p at most."""
+    left = 0.02, {"soil-layer": 0.016, "soil-crust": 0.018}
+    free, by_chance, surely = (beside(monkeypatch, *left, p_value=p) for p in (1.0, 0.5, 1e-4))
+    assert by_chance == free
+    assert surely["nothing"] / (1.0 - surely["nothing"]) == pytest.approx(2 / 3 * np.e * 1e-4 * np.log(1e4))
+    ratio = free["soil-layer"] / free["soil-crust"]
+    assert surely["soil-layer"] / surely["soil-crust"] == pytest.approx(ratio)
+    assert beside(monkeypatch, *left, p_value=0.0)["nothing"] == 0.0
+    # what leaves so much that it is out of the question stays so
+    assert beside(monkeypatch, 0.3, left[1], p_value=0.3)["nothing"] == beside(monkeypatch, 0.3, left[1])["nothing"]
 
 
 def test_what_leaves_least_leads_and_all_add_up_to_one(monkeypatch: pytest.MonkeyPatch) -> None:
