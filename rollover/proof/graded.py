@@ -38,6 +38,10 @@ def grade_of(named: Mapping[str, Any]) -> str | None:
     return said if isinstance(said, str) else None
 
 
+FOREIGN = ("foreign-form", "foreign-engine")  # an effect by a law, or beside an engine, that is not the product's
+ONE = ("single", "other-form", *FOREIGN)  # kinds of one effect
+
+
 def explained(named: Mapping[str, Any]) -> dict[str, float | None] | None:
     """Share of the mismatch that a name is said to explain, with its interval."""
     said = named.get("explains", named.get("share"))
@@ -58,10 +62,10 @@ def real(rows: Sequence[Row], nothing: Sequence[str]) -> dict[str, Any] | None:
 
     `of_all` counts cases that were not detected, or failed, as not named.
     """
-    rows = [r for r in rows if r["kind"] == "foreign-form" or r.get("background")]
+    rows = [r for r in rows if r["kind"] in (*FOREIGN, "background") or r.get("background")]
     if not rows:
         return None
-    one = [r for r in rows if r["kind"] in ("single", "other-form", "foreign-form")]
+    one = [r for r in rows if r["kind"] in ONE]
     alone = [r for r in rows if r["kind"] in nothing]
     unlisted = [r for r in rows if r["kind"] == "outside"]
     shown = [r for r in one if (r.get("over_background") or 0.0) >= 1.0]

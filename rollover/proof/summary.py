@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rollover.proof.counts import Row, counted, mean, median, quantile, share
-from rollover.proof.graded import real
+from rollover.proof.graded import ONE, real
 from rollover.proof.probabilities import reliability
 
 STRENGTHS = ((0.0, 5.0), (5.0, 20.0), (20.0, 100.0), (100.0, 500.0), (500.0, float("inf")))  # signal to noise
 NOISES = ((0.0, 0.005), (0.005, 0.01), (0.01, 0.02), (0.02, 1.0))  # of the range
 NULLS = ("null", "decoy", "negligible", "background")
-ONE = ("single", "other-form", "foreign-form")  # kinds of one effect
 NOBODY = "nothing"
 
 

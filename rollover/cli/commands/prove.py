@@ -48,7 +48,13 @@ def prove(
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder of the full report.")] = Path("out/prove"),
     workers: Annotated[int | None, typer.Option(help="Cases at once", show_default="number of cores", min=0)] = None,
-    rig: Annotated[str, typer.Option(help="What is tested: drop, or overturn (minutes a case).")] = "drop",
+    rig: Annotated[
+        str | None,
+        typer.Option(
+            help="What is tested: drop, or overturn (minutes a case).",
+            show_default="drop; overturn with --kinds foreign-engine",
+        ),
+    ] = None,
     effects: Annotated[
         list[str] | None, typer.Option(metavar="ID", help="Only cases about this effect; may be repeated.")
     ] = None,
@@ -57,7 +63,8 @@ def prove(
         typer.Option(
             metavar="KIND",
             help="Only null, decoy, negligible, single, pair, outside, scatter, other-form, foreign-form (an effect by "
-            "another law of the literature), background (nothing but a background); may be repeated.",
+            "another law of the literature), background (nothing but a background), foreign-engine (an effect in "
+            "overturns by another engine, whose background is that engine alone); may be repeated.",
         ),
     ] = None,
     background: Annotated[
@@ -77,6 +84,7 @@ def prove(
     from rollover.cli import console
     from rollover.proof import runner
 
+    rig = rig or ("overturn" if "foreign-engine" in (kinds or []) else "drop")
     if export is None and truth is not None:
         raise InputError(Fault(file="--truth", message=f"without --export, got {truth}; --export DIR beside it"))
     if export is not None:

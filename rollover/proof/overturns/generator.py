@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,8 +18,8 @@ from rollover.proof.campaign import log_uniform
 from rollover.proof.effect_size import entry, strength
 from rollover.proof.generator import Case, Order
 from rollover.proof.instruments import Fault, Noise, channel_filter
-from rollover.proof.overturns import foreign, library
-from rollover.proof.overturns.library import Change
+from rollover.proof.overturns import engine, foreign, library
+from rollover.proof.overturns.library import Change, Draw
 from rollover.proof.overturns.outside import OUTSIDE
 from rollover.recording import Recording
 from rollover.scenario import Scenario, load
@@ -27,7 +27,8 @@ from rollover.scenario import Scenario, load
 Array = NDArray[np.float64]
 
 KINDS: dict[str, float] = {"null": 0.20, "negligible": 0.05, "single": 0.55, "pair": 0.10, "outside": 0.10}
-MORE_KINDS = ("foreign-form",)  # asked for by name only
+BY_ENGINE = ("foreign-engine", "background")  # one effect beside another engine, or that alone
+MORE_KINDS = ("foreign-form", *BY_ENGINE)  # asked for by name only
 CHANNELS = (
     *(f"chassis/acceleration_{axis}" for axis in "xyz"),
     *(f"chassis/angular_velocity_{axis}" for axis in "xyz"),
@@ -50,6 +51,15 @@ _PLAN = 2**31 - 1
 
 class FailedOverturnError(RuntimeError):
     """An overturn could not be simulated."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Laboratory:
+    """Who makes the recordings: the channels, the run of a scenario, and what may be missing in it, by id."""
+
+    channels: tuple[str, ...]
+    run: Callable[[Scenario], Recording]
+    effects: Mapping[str, Draw]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,10 +110,13 @@ def plan(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[str
         raise ValueError(f"effects: a pair needs two, got {', '.join(effects)}")
     outside = [id for id in OUTSIDE if id in effects] or list(OUTSIDE)
     formed = [id for id in foreign.EFFECTS if id in effects or not effects]
-    if "foreign-form" in shares and not formed:
-        able = ", ".join(foreign.EFFECTS)
-        raise ValueError(f"effects: none of kind foreign-form, got {', '.join(effects)}; {able} are allowed")
-    among = {"single": listed, "pair": listed, "outside": outside, "foreign-form": formed}
+    by_engine = [id for id in engine.EFFECTS if id in effects or not effects]
+    for kind, able in (("foreign-form", list(foreign.EFFECTS)), ("foreign-engine", list(engine.EFFECTS))):
+        if kind in shares and not (formed if kind == "foreign-form" else by_engine):
+            raise ValueError(f"effects: none of kind {kind}, got {', '.join(effects)}; {', '.join(able)} are allowed")
+    if shares.keys() & set(BY_ENGINE) and not engine.is_installed():
+        raise ValueError(f"kinds: of another engine, got {', '.join(kinds)}; {engine.NEEDED}")
+    among = {"single": listed, "pair": listed, "outside": outside, "foreign-form": formed, "foreign-engine": by_engine}
     turns: dict[str, list[str]] = {kind: [] for kind in among}
     orders = []
     for i, kind in enumerate(of_kind[k] for k in random.permutation(len(of_kind))):
@@ -126,25 +139,24 @@ def _next(turn: list[str], all_: Sequence[str], taken: Sequence[str], random: np
 def make(order: Order) -> Case:
     """Make one case: the same for the same order. Raises `FailedOverturnError`."""
     random = np.random.default_rng([order.seed, order.index, 1])
+    lab = _laboratory(order.kind)
     shots = [_shot(random, k) for k in range(4)]
     share = log_uniform(random, 0.005, 0.02)
-    plain = [_solved(shot, ()) for shot in shots]
-    nothing = [_read(shot, solved, ()) for shot, solved in zip(shots, plain, strict=True)]
-    spans = {c: max(float(np.ptp(one[c])) for one in nothing) for c in CHANNELS}
-    draws = {**library.EFFECTS, **library.NEGLIGIBLE, **OUTSIDE}
-    draws = draws if order.kind != "foreign-form" else foreign.EFFECTS
+    plain = [_solved(lab, shot, ()) for shot in shots]
+    nothing = [_read(lab, shot, solved, ()) for shot, solved in zip(shots, plain, strict=True)]
+    spans = {c: max(float(np.ptp(one[c])) for one in nothing) for c in lab.channels}
     changes: tuple[Change, ...] = ()
     for id in order.ids:
         free = {c: span for c, span in spans.items() if c not in [one.channel for one in changes]}
-        changes += (draws[id](random, free),)
-    made = _told(shots, plain, changes)
-    noise = {c: Noise(sigma=share * spans[c], cfc=CLASS) for c in CHANNELS}
+        changes += (lab.effects[id](random, free),)
+    made = _told(lab, shots, plain, changes)
+    noise = {c: Noise(sigma=share * spans[c], cfc=CLASS) for c in lab.channels}
     recordings = tuple(
-        _recorded(k, shot, one, noise, random) for k, (shot, one) in enumerate(zip(shots, made, strict=True))
+        _recorded(lab, k, shot, one, noise, random) for k, (shot, one) in enumerate(zip(shots, made, strict=True))
     )
-    worth = {c: noise[c].independence(1.0 / RATE) for c in CHANNELS}
+    worth = {c: noise[c].independence(1.0 / RATE) for c in lab.channels}
     sigma = {c: n.sigma for c, n in noise.items()}
-    scatter = _scatter(shots, nothing, np.random.default_rng([order.seed, order.index, 2])) if changes else []
+    scatter = _scatter(lab, shots, nothing, np.random.default_rng([order.seed, order.index, 2])) if changes else []
 
     def shows(without: Sequence[Mapping[str, Array]]) -> dict[str, Any]:
         """Strength of what tells the case from the one without, over the noise, and over the scatter as well."""
@@ -152,11 +164,13 @@ def make(order: Order) -> Case:
         found = strength(stamps, made, without, sigma, [worth] * len(shots))
         over = [_over(one, sigma, s) for one, s in zip(made, scatter, strict=True)]
         rest = [_over(one, sigma, s) for one, s in zip(without, scatter, strict=True)]
-        unit = dict.fromkeys(CHANNELS, 1.0)
+        unit = dict.fromkeys(lab.channels, 1.0)
         return {**found, "over_scatter": strength(stamps, over, rest, unit, [worth] * len(shots))["over_noise"]}
 
     rests = (
-        [nothing] if len(changes) == 1 else [_told(shots, plain, [o for o in changes if o is not c]) for c in changes]
+        [nothing]
+        if len(changes) == 1
+        else [_told(lab, shots, plain, [o for o in changes if o is not c]) for c in changes]
     )
     return Case(
         name=order.name,
@@ -175,33 +189,50 @@ def make(order: Order) -> Case:
     )
 
 
-def _told(shots: Sequence[Shot], plain: Sequence[Recording], changes: Sequence[Change]) -> list[dict[str, Array]]:
+def _laboratory(kind: str) -> Laboratory:
+    """Who makes the recordings of a kind of cases."""
+    if kind in BY_ENGINE:
+        return Laboratory(channels=engine.CHANNELS, run=engine.overturn, effects=engine.EFFECTS)
+    every = {**library.EFFECTS, **library.NEGLIGIBLE, **OUTSIDE}
+    return Laboratory(channels=CHANNELS, run=_run, effects=foreign.EFFECTS if kind == "foreign-form" else every)
+
+
+def _run(scenario: Scenario) -> Recording:
+    solved = run(scenario)
+    if solved.status == "failed":
+        raise FailedOverturnError(solved.sentence)
+    return solved.recording
+
+
+def _told(
+    lab: Laboratory, shots: Sequence[Shot], plain: Sequence[Recording], changes: Sequence[Change]
+) -> list[dict[str, Array]]:
     """What the instruments make of all tests with these changes; `plain` are the overturns without any."""
     moved = any(c.moves for c in changes)
-    solved = [_solved(shot, changes) for shot in shots] if moved else plain
-    return [_read(shot, one, changes) for shot, one in zip(shots, solved, strict=True)]
+    solved = [_solved(lab, shot, changes) for shot in shots] if moved else plain
+    return [_read(lab, shot, one, changes) for shot, one in zip(shots, solved, strict=True)]
 
 
 def _scatter(
-    shots: Sequence[Shot], nothing: Sequence[Mapping[str, Array]], random: np.random.Generator
+    lab: Laboratory, shots: Sequence[Shot], nothing: Sequence[Mapping[str, Array]], random: np.random.Generator
 ) -> list[dict[str, Array]]:
     """Root mean square that overturns on grids elsewhere differ by from these, channels (n,) of each test."""
     found = []
     for shot, one in zip(shots, nothing, strict=True):
-        squares = dict.fromkeys(CHANNELS, np.zeros(_stamps(shot).size))
+        squares = dict.fromkeys(lab.channels, np.zeros(_stamps(shot).size))
         for _ in range(NEIGHBOURS):
             x, y = random.uniform(-SHIFTED, SHIFTED, 2)
             there = replace(shot, shifted=(float(x), float(y)))
-            other = _read(there, _solved(there, ()), ())
-            squares = {c: squares[c] + (other[c] - one[c]) ** 2 / NEIGHBOURS for c in CHANNELS}
+            other = _read(lab, there, _solved(lab, there, ()), ())
+            squares = {c: squares[c] + (other[c] - one[c]) ** 2 / NEIGHBOURS for c in lab.channels}
         window = np.ones(round(WINDOW * RATE)) / round(WINDOW * RATE)
-        found.append({c: np.sqrt(np.convolve(squares[c], window, mode="same")) for c in CHANNELS})
+        found.append({c: np.sqrt(np.convolve(squares[c], window, mode="same")) for c in lab.channels})
     return found
 
 
 def _over(made: Mapping[str, Array], sigma: Mapping[str, float], scatter: Mapping[str, Array]) -> dict[str, Array]:
     """Channels over noise and scatter together."""
-    return {c: made[c] / np.hypot(sigma[c], scatter[c]) for c in CHANNELS}
+    return {c: made[c] / np.hypot(sigma[c], scatter[c]) for c in made}
 
 
 def _shot(random: np.random.Generator, k: int) -> Shot:
@@ -219,7 +250,7 @@ def _shot(random: np.random.Generator, k: int) -> Shot:
     )
 
 
-def _solved(shot: Shot, changes: Sequence[Change]) -> Recording:
+def _solved(lab: Laboratory, shot: Shot, changes: Sequence[Change]) -> Recording:
     """The overturn in finer steps, on a finer grid, with what the changes say written into its scenario."""
     values: dict[str, Any] = dict(shot.conditions)
     for change in changes:
@@ -237,10 +268,10 @@ def _solved(shot: Shot, changes: Sequence[Change]) -> Recording:
             "simulation.spectral_radius": SPECTRAL_RADIUS,
         }
     )
-    solved = run(finer)
-    if solved.status == "failed":
-        raise FailedOverturnError(solved.sentence)
-    return solved.recording
+    try:
+        return lab.run(finer)
+    except engine.EngineError as e:
+        raise FailedOverturnError(str(e)) from e
 
 
 def _base() -> Scenario:
@@ -257,12 +288,12 @@ def _stamps(shot: Shot) -> Array:
     return np.asarray(np.round(np.arange(int(LENGTH * RATE) + 1) / RATE + shot.late, 9))
 
 
-def _read(shot: Shot, solved: Recording, changes: Sequence[Change]) -> dict[str, Array]:
+def _read(lab: Laboratory, shot: Shot, solved: Recording, changes: Sequence[Change]) -> dict[str, Array]:
     """What the instruments make of an overturn at the recorder's stamps, behind their filters, without noise."""
     wrong = {c.channel: c.fault for c in changes if c.channel}
     times = _stamps(shot) - shot.late
     found = {}
-    for c in CHANNELS:
+    for c in lab.channels:
         fault = wrong.get(c)
         late = fault.offset if fault else 0.0
         step = float(np.median(np.diff(solved.time)))
@@ -287,16 +318,21 @@ def _spoiled(values: Array, times: Array, fault: Fault) -> Array:
 
 
 def _recorded(
-    k: int, shot: Shot, made: Mapping[str, Array], noise: Mapping[str, Noise], random: np.random.Generator
+    lab: Laboratory,
+    k: int,
+    shot: Shot,
+    made: Mapping[str, Array],
+    noise: Mapping[str, Noise],
+    random: np.random.Generator,
 ) -> Recording:
     time = _stamps(shot)
     return Recording(
         title=f"Side overturn {k + 1}",
         source="overturning site, utility tractor on natural clay",
         time=time,
-        channels={c: made[c] + noise[c].drawn(time.size, 1.0 / RATE, random) for c in CHANNELS},
+        channels={c: made[c] + noise[c].drawn(time.size, 1.0 / RATE, random) for c in lab.channels},
         conditions=shot.conditions,
-        cfc=dict.fromkeys(CHANNELS, CLASS),
+        cfc=dict.fromkeys(lab.channels, CLASS),
     )
 
 
@@ -331,7 +367,7 @@ def _truth(
         "signal_to_noise": float(whole["signal_to_noise"]),
         "where": whole["where"],
         "noise": {c: float(n.sigma) for c, n in noise.items()},
-        "noise_share": dict.fromkeys(CHANNELS, share),
+        "noise_share": dict.fromkeys(noise, share),
         "recordings": [
             {"title": r.title, "conditions": s.conditions, "late": s.late, "samples": r.time.size}
             for r, s in zip(recordings, shots, strict=True)
