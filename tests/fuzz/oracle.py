@@ -34,7 +34,7 @@ CLASSES = ("traceback", "hang", "memory", "outside", "unreadable", "line", "stat
 # a cure: what is allowed, needed, meant, or what to do instead, behind what is wrong
 _CURE = re.compile(r"; \S|\? |did you mean|\b(is|are) (needed|allowed)\b")
 _OWN_CODE = re.compile(r"\S+\.py(:\d+)?: ")  # what Python says of a user's own code is what helps there
-_PLACE = re.compile(r"\S.*?: \S")
+_PLACE = re.compile(r"\s*\S.*?: \S")
 # how libraries and Python word things that nobody asked about
 _BARE = re.compile(
     r"\b[A-Z]\w+(Error|Exception|Warning)\b|NoneType|object has no attribute|Errno|<class |object at 0x|Traceback"
