@@ -118,7 +118,7 @@ class Effect:
         return search
 
     @classmethod
-    def bent(cls, numbers: Mapping[str, float], shape: str, value: float) -> Mapping[str, float]:
+    def reshaped(cls, numbers: Mapping[str, float], shape: str, value: float) -> Mapping[str, float]:
         """Numbers with another value of a shape, and what goes along with it so that what shows most stays as it is."""
         return {**numbers, shape: value}
 

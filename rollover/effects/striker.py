@@ -145,7 +145,7 @@ class StructuralCompliance(Effect):
         return None if parameter == "nose_share" and is_known else search
 
     @classmethod
-    def bent(cls, numbers: Mapping[str, float], shape: str, value: float) -> Mapping[str, float]:
+    def reshaped(cls, numbers: Mapping[str, float], shape: str, value: float) -> Mapping[str, float]:
         """Frequency and damping stay, k and c in proportion to the reduced mass M s (1 - s) of nose and body."""
         more = value * (1.0 - value) / (numbers[shape] * (1.0 - numbers[shape]))
         return {**{name: more * v for name, v in numbers.items() if name != shape}, shape: value}

@@ -136,7 +136,7 @@ def test_a_nose_is_found_along_the_valley_of_its_frequency(tmp_path: Path) -> No
     true = case.truth["effects"][0]["parameters"]
     problem = judge_of_case(case, tmp_path)
     c = candidate(problem, "structural-compliance")
-    share = EFFECTS[c.id].bent(true, "nose_share", 0.1)
+    share = EFFECTS[c.id].reshaped(true, "nose_share", 0.1)
     plain = problem.fit((c,), [coordinate(share[name], s) for name, s in c.search.items()])
     assert plain is not None
     assert plain.left > 4.0 * sum(e.count for e in problem.dataset)
@@ -153,7 +153,7 @@ def test_a_noses_share_moves_at_constant_frequency_and_damping() -> None:
     """w^2 = k/(M s (1 - s)), 2 zeta w = c/(M s (1 - s)): what rings freely moves the reduced mass."""
     effect = EFFECTS["structural-compliance"]
     before = {"stiffness": 2e6, "damping": 300.0, "nose_share": 0.1}
-    after = effect.bent(before, "nose_share", 0.3)
+    after = effect.reshaped(before, "nose_share", 0.3)
     for name in ("stiffness", "damping"):
         w = [n[name] / (n["nose_share"] * (1.0 - n["nose_share"])) for n in (before, after)]
         assert w[1] == pytest.approx(w[0], rel=1e-12)
@@ -227,7 +227,7 @@ def test_what_rings_is_traced_along_the_valley_of_its_frequency(tmp_path: Path) 
     x = [coordinate(ended[name], s) for name, s in c.search.items()]
     stopped = problem.fit((c,), x, rounds=0, shifts=[0.0] * len(case.recordings))
     assert stopped is not None
-    bent, own = c.bent(x)
+    bent, own = c.reshaped(x)
     assert bent.plain(own)[1] == pytest.approx(x)
     assert [k for k, _, _ in threshold_ranges(stopped)] == [2, 2]
     found = min((with_threshold_traced(problem, stopped, s) for s in threshold_ranges(stopped)), key=lambda f: f.left)

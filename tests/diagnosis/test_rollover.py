@@ -102,14 +102,14 @@ def test_candidates_begin_at_what_the_scenario_has() -> None:
     }  # fmt: skip
     for id, value in known.items():
         candidate = by_id[id]
-        assert candidate.neutral is not None
+        assert candidate.null is not None
         (search,) = candidate.search.values()
-        assert candidate.neutral[0] is not None, id
-        assert physical(candidate.neutral[0], search) == pytest.approx(value, rel=1e-6, abs=1e-9), id
-        assert all(0.0 < x < 1.0 and x != candidate.neutral[0] for (x,) in candidate.starts())
-    assert by_id["tyre-lateral-stiffness"].neutral == (None,)  # front and rear differ: no one value changes nothing
-    assert by_id["centre-of-mass"].neutral == (0.5, 0.5)
-    assert by_id["tank-slosh"].neutral == (None, None)
+        assert candidate.null[0] is not None, id
+        assert physical(candidate.null[0], search) == pytest.approx(value, rel=1e-6, abs=1e-9), id
+        assert all(0.0 < x < 1.0 and x != candidate.null[0] for (x,) in candidate.starts())
+    assert by_id["tyre-lateral-stiffness"].null == (None,)  # front and rear differ: no one value changes nothing
+    assert by_id["centre-of-mass"].null == (0.5, 0.5)
+    assert by_id["tank-slosh"].null == (None, None)
     assert len(by_id["tank-slosh"].starts()) <= 6
     load = by_id["payload-shift"]  # tells only near its travel: looked at in many, beside little and much friction
     by_friction = {

@@ -41,12 +41,16 @@ def with_fitted_shape(problem: Problem, f: Fitted, leaves: Sequence[float]) -> F
         return None
     found = found if is_noise(found) or found.left > TUNING.no_ridge_above * sum(leaves) else polish(problem, found)
     (whole, x), shifts = found.candidates[-1].plain(found.own), [b.shift for b in found.blocks]
-    bent = problem.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
+    variant = problem.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
     own = dict(zip(found.candidates[-1].search, found.own, strict=True))
     usual = problem.fit(f.candidates, (*found.x[:at], *(own[name] for name in last.search)), shifts=shifts, width=2)
-    if bent is None or usual is None:
-        return bent or usual
-    return usual if usual.left < bent.left + enough(bent.left, sum(b.residual.size for b in bent.blocks)) else bent
+    if variant is None or usual is None:
+        return variant or usual
+    return (
+        usual
+        if usual.left < variant.left + enough(variant.left, sum(b.residual.size for b in variant.blocks))
+        else variant
+    )
 
 
 def in_other_form(problem: Problem, f: Fitted, last: Candidate, leaves: Sequence[float]) -> Fitted | None:

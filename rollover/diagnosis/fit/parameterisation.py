@@ -31,13 +31,13 @@ class Candidate:
     family: str
     search: Mapping[str, Search]
     channel: str | None = None
-    neutral: tuple[float | None, ...] | None = None  # coordinates that change nothing; given where a place costs a run
+    null: tuple[float | None, ...] | None = None  # coordinates that change nothing; given where a place costs a run
     shapes: Mapping[str, Search] = field(default_factory=dict)  # fitted only where what is left asks for them
     fixed: Mapping[str, Any] = field(default_factory=dict)  # parameters that are not fitted
     form: Mapping[str, float] = field(default_factory=dict)  # those of them that make another form of the same effect
     own: Mapping[str, float] = field(default_factory=dict)  # the scenario's values, where no number is an effect's null
     places: tuple[tuple[float, ...], ...] = ()  # where it is looked at, if not wherever its `probes` are
-    along: tuple[str, ...] = ()  # of a fitted shape, at whose default all other coordinates are held: `Effect.bent`
+    along: tuple[str, ...] = ()  # of a fitted shape, at whose default all other coordinates are held: `Effect.reshaped`
     # no effect: what any explanation is fitted beside, see `Fitted.effects`; fits begin from its `places` as well
     is_baseline: bool = False
 
@@ -55,7 +55,7 @@ class Candidate:
     @property
     def is_placed(self) -> bool:
         """Whether a parameter says where or when it acts: one that changes nothing nowhere."""
-        return self.neutral is not None and len(self.search) > 1 and None in self.neutral
+        return self.null is not None and len(self.search) > 1 and None in self.null
 
     @property
     def is_narrow(self) -> bool:
@@ -68,7 +68,7 @@ class Candidate:
         return EFFECTS[self.id].is_discontinuous
 
     @property
-    def rings(self) -> bool:
+    def is_oscillatory(self) -> bool:
         """Whether it rings, by a frequency and a damping."""
         return EFFECTS[self.id].is_abrupt and {"stiffness", "damping"} <= self.search.keys()
 
@@ -108,7 +108,7 @@ class Candidate:
         """Parameters by name for coordinates x."""
         found: Mapping[str, float] = {n: physical(v, s) for v, (n, s) in zip(x, self.search.items(), strict=True)}
         for name in self.along:
-            found = EFFECTS[self.id].bent({**found, name: getattr(EFFECTS[self.id](), name)}, name, found[name])
+            found = EFFECTS[self.id].reshaped({**found, name: getattr(EFFECTS[self.id](), name)}, name, found[name])
         return dict(found)
 
     def strength(self, x: Sequence[float]) -> float:
@@ -123,8 +123,8 @@ class Candidate:
 
     def starts(self) -> list[tuple[float, ...]]:
         """Coordinates to look at first; the first of two parameters, a depth or a frequency, in the finer steps."""
-        if self.neutral is not None:
-            return self._beside(self.neutral)
+        if self.null is not None:
+            return self._beside(self.null)
         axes = []
         for s, many in zip(
             self.search.values(), TUNING.grid_of_one if len(self.search) == 1 else TUNING.grid_of_several, strict=False
@@ -140,18 +140,18 @@ class Candidate:
             axes.append(inside)
         return list(itertools.product(*axes))
 
-    def _beside(self, neutral: tuple[float | None, ...]) -> list[tuple[float, ...]]:
+    def _beside(self, null: tuple[float | None, ...]) -> list[tuple[float, ...]]:
         """Few coordinates: a step to either side of what changes nothing, places spread where nothing is known to."""
-        known = [k for k, n in enumerate(neutral) if n is not None]
-        if len(known) == len(neutral):
-            at = [float(n) for n in neutral if n is not None]
+        known = [k for k, n in enumerate(null) if n is not None]
+        if len(known) == len(null):
+            at = [float(n) for n in null if n is not None]
             steps = [(k, sign * TUNING.run_step) for k in known for sign in (1.0, -1.0)]
             beside = [tuple(a + (d if a + d < 1.0 else -d) * (j == k) for j, a in enumerate(at)) for k, d in steps]
             # what the scenario has may be far above what ever acts: a yield force, a stop
             is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
             return [*beside, *((x,) for x in TUNING.limit_places if is_limit)]
         axes, narrow = [], EFFECTS[self.id].narrow
-        for n, (name, search) in zip(neutral, self.search.items(), strict=True):
+        for n, (name, search) in zip(null, self.search.items(), strict=True):
             if n is not None:
                 axes.append([min(n + 2.0 * TUNING.run_step, 0.9)])
             elif name in narrow:
@@ -169,12 +169,12 @@ class Candidate:
 
         Where it acts, if that is a parameter, is spread as in `probes`; what begins at no strength at all has one end.
         """
-        if self.neutral is None:
+        if self.null is None:
             return []
-        beside = self._beside(self.neutral)
+        beside = self._beside(self.null)
         ways = [
             (k, end, way, n)
-            for k, n in enumerate(self.neutral)
+            for k, n in enumerate(self.null)
             if n is not None
             for end in (0.0, 1.0)
             for way in TUNING.strong_shares
@@ -186,7 +186,7 @@ class Candidate:
             ][:1]
         found = list(beside)
         for place in beside:
-            usual = [p if n is None else n for p, n in zip(place, self.neutral, strict=True)]
+            usual = [p if n is None else n for p, n in zip(place, self.null, strict=True)]
             found += [(*usual[:k], n + way * (end - n), *usual[k + 1 :]) for k, end, way, n in ways]
         return list(dict.fromkeys(found))
 
@@ -194,12 +194,12 @@ class Candidate:
         """The same with nothing `along` its shape, and the coordinates at which that is what this one is at x."""
         return replace(self, along=()), coordinates(self.values(x), self.search)
 
-    def bent(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
+    def reshaped(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
         """The same along its shape as far as that is fitted, and its coordinates there: the way back from `plain`."""
         kind, values = EFFECTS[self.id], self.values(x)
         names = tuple(name for name in self.search if name in kind.shapes)
         for name in names:
-            values = {**kind.bent(values, name, getattr(kind(), name)), name: values[name]}
+            values = {**kind.reshaped(values, name, getattr(kind(), name)), name: values[name]}
         return replace(self, along=names), coordinates(values, self.search)
 
     def whole(self) -> Candidate:
@@ -227,8 +227,8 @@ class Candidate:
         """Coordinates to span the directions in which it begins: small where it has a zero, or spread, or `places`."""
         if self.places:
             return list(self.places)
-        if self.neutral is not None:
-            return self._beside(self.neutral)
+        if self.null is not None:
+            return self._beside(self.null)
         axes: list[list[float]] = []
         for name, s in self.search.items():
             null = EFFECTS[self.id].null.get(name)

@@ -31,7 +31,7 @@ def threshold_ranges(fitted: Fitted) -> list[Stretch]:
     """
     last, at = fitted.candidates[-1], len(fitted.x) - len(fitted.own)
     strength = strength_parameter(last.id, last.search)[0]
-    if last.rings:
+    if last.is_oscillatory:
         names = [name for name in last.search if name in EFFECTS[last.id].shapes]
     else:
         names = [name for name in last.search if (name == strength) == is_clock(fitted)]
@@ -87,7 +87,7 @@ def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) ->
     A threshold that moves past a sample leaves a misfit of many small valleys: it is tried all along its stretch, and
     finely beside the fit, on few recordings. What rings keeps its frequency meanwhile.
     """
-    if fitted.candidates[-1].rings:
+    if fitted.candidates[-1].is_oscillatory:
         return _along_frequency_ridge(problem, fitted, stretch)
     last, shifts = fitted.candidates[-1], [b.shift for b in fitted.blocks]
     k, at = stretch[0], len(fitted.x) - len(fitted.own)
@@ -126,8 +126,8 @@ def _best_start(
 def _along_frequency_ridge(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
     """The fit of what rings begun anew with another shape, along the valley of its frequency; never worse."""
     shifts, at = [b.shift for b in fitted.blocks], len(fitted.x) - len(fitted.own)
-    bent, own = fitted.candidates[-1].bent(fitted.own)
-    candidates, x = (*fitted.candidates[:-1], bent), (*fitted.x[:at], *own)
+    variant, own = fitted.candidates[-1].reshaped(fitted.own)
+    candidates, x = (*fitted.candidates[:-1], variant), (*fitted.x[:at], *own)
     there = [(*x[: stretch[0]], v, *x[stretch[0] + 1 :]) for v in _places(fitted, stretch)]
     few = representative_recordings(fitted)
     met = [(left, y) for y in there if (left := left_at(problem, candidates, y, shifts, few)) is not None]
@@ -135,7 +135,7 @@ def _along_frequency_ridge(problem: Problem, fitted: Fitted, stretch: Stretch) -
     for y in _local_minima(met)[: TUNING.valleys]:
         new = problem.fit(candidates, y, shifts=shifts, width=1)
         if new is not None:
-            plain = (*new.x[:at], *bent.plain(new.own)[1])
+            plain = (*new.x[:at], *variant.plain(new.own)[1])
             again = problem.fit(fitted.candidates, plain, shifts=[b.shift for b in new.blocks], width=2)
             best = again if again is not None and again.left < best.left else best
     return best

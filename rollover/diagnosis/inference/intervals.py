@@ -161,8 +161,8 @@ def _rippled(fitted: Fitted) -> set[int]:
 
     From sample to sample that a threshold passes the misfit rises and falls again, along a valley longer than one wave.
     """
-    bent = (own for c, own in with_slices(fitted.candidates) if c.has_secondary)
-    return {k for own in bent for k in range(own.start, own.stop)}
+    secondary = (own for c, own in with_slices(fitted.candidates) if c.has_secondary)
+    return {k for own in secondary for k in range(own.start, own.stop)}
 
 
 def _over_local_minima(problem: Problem, fitted: Fitted, way: Array, k: int, most: float) -> float:

@@ -60,13 +60,11 @@ def candidates_of(
         if not search:
             continue
         shapes = {p: there[p] for p in kind.shapes if p in there}
-        unlike = {} if scenario is None else {p: _neutral(kind, p, s, scenario) for p, s in search.items()}
-        neutral = None if acts == "drop" else tuple(unlike.get(p) for p in search)
+        unlike = {} if scenario is None else {p: _null_coordinate(kind, p, s, scenario) for p, s in search.items()}
+        null = None if acts == "drop" else tuple(unlike.get(p) for p in search)
         held = {p: physical(x, search[p]) for p, x in unlike.items() if x is not None and kind.null.get(p) is None}
         found.append(
-            Candidate(
-                id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes, neutral=neutral, own=held
-            )
+            Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes, null=null, own=held)
         )
     return found
 
@@ -97,7 +95,7 @@ def of_sensors(dataset: Sequence[Dataset]) -> list[Candidate]:
     ]
 
 
-def _neutral(kind: Any, parameter: str, search: Search, scenario: Any) -> float | None:
+def _null_coordinate(kind: Any, parameter: str, search: Search, scenario: Any) -> float | None:
     """Coordinate at which a parameter changes nothing: its null, or what gives the scenario's own value; else None."""
     null = kind.null.get(parameter)
     if null is not None:

@@ -160,7 +160,7 @@ def significant_by_wald(problem: Problem, fitted: Fitted) -> set[int]:
 def _nulls(c: Candidate) -> dict[str, float]:
     """Values of an effect's parameters that change nothing, of those that have a number for it."""
     nulls: dict[str, Any] = dict(EFFECTS[c.id].null)
-    for (name, search), at in zip(c.search.items(), c.neutral or (None,) * len(c.search), strict=True):
+    for (name, search), at in zip(c.search.items(), c.null or (None,) * len(c.search), strict=True):
         nulls[name] = nulls.get(name) if at is None else physical(at, search)
     return {name: float(nulls[name]) for name in c.search if isinstance(nulls.get(name), (int, float))}
 

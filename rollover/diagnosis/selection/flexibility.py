@@ -79,8 +79,8 @@ def is_over_flexible(candidates: Sequence[Candidate]) -> bool:
     soil draws one on the way down and another on the way back.
     """
     subjects = [c.channel or _subject(c) for c in candidates]
-    bent = [s for s, c in zip(subjects, candidates, strict=True) if c.has_secondary]
-    return (len(candidates) == TUNING.most_effects and len(set(subjects)) == 1) or len(set(bent)) < len(bent)
+    varied = [s for s, c in zip(subjects, candidates, strict=True) if c.has_secondary]
+    return (len(candidates) == TUNING.most_effects and len(set(subjects)) == 1) or len(set(varied)) < len(varied)
 
 
 def _subject(c: Candidate) -> str:

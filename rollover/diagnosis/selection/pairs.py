@@ -47,9 +47,13 @@ def best_subsets(
     if pair is None:
         return None
     found, left = followed(inquiry, pair)
-    if not is_enough(problem, found.fitted, left) and any(c.rings for c in found.fitted.candidates):
+    if not is_enough(problem, found.fitted, left) and any(c.is_oscillatory for c in found.fitted.candidates):
         # what its shape shows now did not show beside another one
-        ringing = found.fitted if found.fitted.candidates[-1].rings else problem.again(first_effect_last(found.fitted))
+        ringing = (
+            found.fitted
+            if found.fitted.candidates[-1].is_oscillatory
+            else problem.again(first_effect_last(found.fitted))
+        )
         other = with_first_replaced(inquiry, ringing)
         if other is not None and other.fitted.left < found.fitted.left:
             found, left = followed(inquiry, other)
@@ -210,7 +214,11 @@ def _with_secondary_fitted(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fi
 
     With a wrong share of the nose all that stands beside it is met as badly, and the wrong one may lead.
     """
-    able = [f if f.candidates[-1].rings else inquiry.problem.again(first_effect_last(f)) for f in pairs if _rings(f)]
+    able = [
+        f if f.candidates[-1].is_oscillatory else inquiry.problem.again(first_effect_last(f))
+        for f in pairs
+        if _is_oscillatory(f)
+    ]
     lead = min(pairs, key=lambda f: f.left)
     near = [f for f in able if f.left < TUNING.same_misfit * lead.left and f.candidates[-1].shapes]
     leaves = tuple(b.total for b in lead.blocks)
@@ -232,7 +240,7 @@ def _traced(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
     near = (f for f in ranked if f.left < TUNING.placed_misfit * ranked[0].left)
     ways = (way for f in near for way in (f, inquiry.problem.again(first_effect_last(f))))
     able = itertools.islice(
-        (way for way in ways if threshold_ranges(way) and not way.candidates[-1].rings), TUNING.placed
+        (way for way in ways if threshold_ranges(way) and not way.candidates[-1].is_oscillatory), TUNING.placed
     )
     tasks = [replace(continued_from(f, "trace"), stretch=s) for f in able for s in threshold_ranges(f)]
     return [f for f in inquiry.fits(tasks) if f is not None]
@@ -255,8 +263,8 @@ def _mirrored(inquiry: Inquiry, pair: Fitted) -> list[Fitted]:
     return found
 
 
-def _rings(pair: Fitted) -> bool:
-    return any(c.rings for c in pair.candidates)
+def _is_oscillatory(pair: Fitted) -> bool:
+    return any(c.is_oscillatory for c in pair.candidates)
 
 
 def _partners(
@@ -272,9 +280,9 @@ def _partners(
     for f in (*leading, *later):
         last = f.candidates[-1]
         found.setdefault((last.key, last.has_secondary), (last, f.own))
-    known, bent = {key for key, _ in found}, {key for key, has_secondary in found if has_secondary}
+    known, varied = {key for key, _ in found}, {key for key, has_secondary in found if has_secondary}
     ranked = sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
     for k, s in enumerate(ranked):
-        if s.candidate.key in bent or (k < scored and s.candidate.key not in known):
+        if s.candidate.key in varied or (k < scored and s.candidate.key not in known):
             found.setdefault((s.candidate.key, s.candidate.has_secondary), (s.candidate, s.starts[0]))
     return list(found.values())

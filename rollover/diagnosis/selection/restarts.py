@@ -67,7 +67,7 @@ def _damping_frequency_scan(
     It leads by what it leaves, or by its score: its frequency may have been found beside a wrong damping.
     """
     near = [f for f in fits if f.left < TUNING.leading_misfit * fits[0].left or f.candidates[-1].key == looked.best]
-    old = next((f for f in near if f.candidates[-1].rings and len(f.own) == 2), None)
+    old = next((f for f in near if f.candidates[-1].is_oscillatory and len(f.own) == 2), None)
     if old is None:
         return list(fits)
     few = representative_recordings(old)

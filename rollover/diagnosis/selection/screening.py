@@ -147,12 +147,12 @@ def of_same_family(ranked: Sequence[Candidate], taken: int, leaders: int) -> lis
 
 def _begun_at(c: Candidate, met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
     """Where fits begin: the best starts; of few and far ones the first, or the best and beside what changes nothing."""
-    if c.neutral is None:
+    if c.null is None:
         return _apart(met)
-    neutral = [n + SETTINGS.fit.parameterisation.zero_step for n in c.neutral if n is not None]
-    if len(neutral) < len(c.neutral):
+    null = [n + SETTINGS.fit.parameterisation.zero_step for n in c.null if n is not None]
+    if len(null) < len(c.null):
         return tuple(start for _, start in met[: SETTINGS.selection.score_test.ways])
-    return (tuple(neutral), met[0][1])
+    return (tuple(null), met[0][1])
 
 
 def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:

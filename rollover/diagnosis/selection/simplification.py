@@ -105,12 +105,12 @@ def _in_usual_shapes(inquiry: Inquiry, found: Step) -> Step | None:
     What had to be bent to do another's work as well is straight again once that stands beside it.
     """
     best, usual = found.fitted, {c.key: c for c in inquiry.candidates}
-    bent = [
+    varied = [
         k for k, c in enumerate(best.candidates) if c.has_secondary and usual[c.key].search.keys() <= c.search.keys()
     ]
-    if len(best.effects) < 2 or not bent:
+    if len(best.effects) < 2 or not varied:
         return None
-    shifts, ways = tuple(b.shift for b in best.blocks), [bent, *([k] for k in bent if len(bent) > 1)]
+    shifts, ways = tuple(b.shift for b in best.blocks), [varied, *([k] for k in varied if len(varied) > 1)]
     tasks = [
         Task(candidates=c, start=x, shifts=shifts, width=1) for c, x in (in_usual_shape(best, usual, w) for w in ways)
     ]
