@@ -24,7 +24,7 @@ def page(answers: Sequence[Answer], *, command: str, scenario_hash: str = "") ->
         written = "1 baseline was" if len(updated) == 1 else f"{len(updated)} baselines were"
         head = Headline(sentence=f"{written} written.")
     else:
-        head = Headline(sentence=f"{as_sentence(unchanged(len(answers)))}.", state="pass")
+        head = Headline(sentence=f"{as_sentence(unchanged(answers))}.", state="pass")
     rows: list[list[str | Cell]] = [
         [
             a.scenario,

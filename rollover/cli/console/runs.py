@@ -137,7 +137,7 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
 
 def regression(answers: Sequence[Answer], folder: str) -> None:
     """What changed, and one line for each scenario, on standard output."""
-    from rollover.studies.baseline import unchanged
+    from rollover.studies.baseline import unchanged, without_baseline
 
     out = terminal.out()
     table = Table(box=None, pad_edge=False)
@@ -171,5 +171,7 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
     written = "1 baseline written" if updated == 1 else f"{updated} baselines written"
     verdict = written if updated else f"{bad} of {len(answers)} scenarios are not as they were"
     if not bad and not updated:
-        verdict = unchanged(len(answers))
+        verdict = unchanged(answers)
+    elif aside := without_baseline(answers):
+        verdict = f"{verdict}; {aside}"
     out.print(f"{verdict[0].upper()}{verdict[1:]}. Everything: {folder}", style="bold")
