@@ -65,8 +65,8 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Bench:
     monkeypatch.setattr(simulate, "run", bench.run)
     monkeypatch.setattr("ground.compiled.is_warm", lambda *_: True)
     log, report = types.ModuleType("viz.recordings.log"), types.ModuleType("viz.pages.report")
-    log.write_rrd = lambda run, path, peaks: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
-    report.page = lambda run, peaks, answer, rows, command, near: f"<p>{command}</p>"  # type: ignore[attr-defined]
+    log.write_rrd = lambda run, path, peaks, bands: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
+    report.page = lambda run, peaks, answer, rows, command, near, bands: f"<p>{command}</p>"  # type: ignore[attr-defined]
     for module in (log, report):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr(assessed, "peak_loads", bench.peak_loads)

@@ -144,7 +144,6 @@ def _two_runs(
     from rollover.comparison.run_pair import is_result, pair, summary
     from rollover.comparison.run_pair import read as result
     from viz.content.pair_words import answer as in_words
-    from viz.content.pair_words import markdown
     from viz.pages.pair import page
 
     if refused:
@@ -168,8 +167,7 @@ def _two_runs(
     if as_json:
         print(json.dumps(results.plain(answer), indent=2))
     else:
-        console.tell(markdown(found))
-        console.say(f"Results: {folder}")
+        console.pair(found, str(folder))
 
 
 def _draw_pair(found: Pair, path: Path) -> None:

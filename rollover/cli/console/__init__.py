@@ -1,6 +1,7 @@
 """What people read while a command works and when it is done: progress, tables, sentences. The only home of rich."""
 
 from rollover.cli.console.frames import rops
+from rollover.cli.console.pairs import pair
 from rollover.cli.console.plans import plan
 from rollover.cli.console.recordings import calibration, comparison, diagnosis, rolling, stability
 from rollover.cli.console.runs import regression, report
@@ -14,6 +15,7 @@ __all__ = [
     "comparison",
     "counting",
     "diagnosis",
+    "pair",
     "plan",
     "progress",
     "readable",

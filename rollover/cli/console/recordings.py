@@ -152,6 +152,11 @@ def stability(answer: Mapping[str, Any], folder: str) -> None:
     """Static stability angles, a line for each heading, with the closed forms for stiff tyres beside."""
     out = terminal.out()
     out.print(excerpt(answer["vehicle"]), style="bold")
+    least, limit = answer["least"], answer["code_6"]
+    verdict = "below" if least["balance_deg"] < limit["limit_deg"] else "not below"
+    angle, heading = f"{least['balance_deg']:.2f} deg", f"heading {least['heading_deg']:g}"
+    asked = f"{limit['limit_deg']:g} deg asked of narrow tractors ({limit['confidence']})"
+    out.print(f"Least static stability angle {angle}, at {heading}: {verdict} the {asked}.", style="bold")
     table = Table(box=None, pad_edge=False)
     for heading in ("heading", "lift-off", "pivot ends", "on stop", "overturns", "stiff: pivot", "stiff: stop"):
         table.add_column(heading, justify="right")
@@ -169,13 +174,6 @@ def stability(answer: Mapping[str, Any], folder: str) -> None:
         share, was, now = 100.0 * part["share"], part["without_deg"], part["with_deg"]
         out.print(f"{part['part']}: takes {share:.1f} % across the slope, {was:.2f} -> {now:.2f} deg")
     _left_out(answer)
-    least, limit = answer["least"], answer["code_6"]
-    verdict = "below" if least["balance_deg"] < limit["limit_deg"] else "not below"
-    out.print(
-        f"Least {least['balance_deg']:.2f} deg at heading {least['heading_deg']:g}: {verdict} the "
-        f"{limit['limit_deg']:g} deg asked of narrow tractors ({limit['confidence']}).",
-        style="bold",
-    )
     out.print(f"Results: {folder}")
 
 
@@ -188,6 +186,9 @@ def rolling(answer: Mapping[str, Any], folder: str) -> None:
     """Verdict of the planar calculation of rolling, beside every number on the way."""
     out = terminal.out()
     out.print(excerpt(answer["vehicle"]), style="bold")
+    out.print(
+        f"{answer['verdict'].capitalize()} rolling (version {answer['version']}): {answer['sentence']}.", style="bold"
+    )
     table = Table(box=None, pad_edge=False)
     table.add_column("step")
     table.add_column("what")
@@ -200,8 +201,5 @@ def rolling(answer: Mapping[str, Any], folder: str) -> None:
     for said in answer["outside"]:
         out.print(said, style="yellow")
     _left_out(answer)
-    out.print(
-        f"{answer['verdict'].capitalize()} rolling (version {answer['version']}): {answer['sentence']}.", style="bold"
-    )
     out.print(f"{answer['source']}.")
     out.print(f"Results: {folder}")

@@ -26,9 +26,10 @@ def report(
     answer: Mapping[str, Any],
     folder: str,
     *,
+    headline: str,
     compiled: bool = False,
 ) -> None:
-    """The answer of a run on standard output; what took part of its time to compile tells no speed."""
+    """The answer of a run, its `headline` first; what took part of its time to compile tells no speed."""
     from rollover.assessment.criteria import in_words
     from rollover.assessment.ledger import closure
     from rollover.assessment.shipped import origin
@@ -36,6 +37,8 @@ def report(
 
     out = terminal.out()
     out.print(excerpt(run.scenario.title), style="bold")
+    if run.status == "done":
+        out.print(headline, style="bold")
     if (made_from := origin(run.scenario)) and made_from.differences:
         out.print(f"{made_from.in_words}.", style="yellow")
     if run.status == "done":
