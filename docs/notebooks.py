@@ -24,6 +24,20 @@ FILE = re.compile(r"# (\S+\.(?:yaml|csv))\n")
 TITLE = re.compile(r"^(# .*\n)", flags=re.MULTILINE)
 SHELL, WRITE = "%%sh\n", "%%writefile "
 LANGUAGES = ((re.compile(re.escape(SHELL)), "sh"), (re.compile(WRITE + r".*\n"), "yaml"))
+STARTUP = """import os, subprocess, sys
+from IPython.core.magic import register_cell_magic
+
+os.path.lexists(".venv") or os.symlink(sys.prefix, ".venv")
+for name in ("FORCE_COLOR", "CLICOLOR_FORCE", "CLICOLOR", "PY_COLORS"):
+    os.environ.pop(name, None)
+
+
+@register_cell_magic
+def sh(line, cell):  # IPython's own shows output in pieces of 100 bytes, each as a line of its own once it is merged
+    done = subprocess.run(cell, shell=True, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    print("\\n".join(row.rstrip() for row in done.stdout.splitlines()))
+    done.check_returncode()
+"""
 
 
 def notebook(text: str, name: str) -> str:
@@ -67,10 +81,8 @@ def shown(app: Any, tree: Any) -> None:
 
 
 def prepare(profile: Path) -> None:
-    """Write the profile of the kernels: quiet, and with `.venv` in the folder where a notebook runs."""
+    """Write the profile of the kernels: quiet, without colours, `.venv` in the folder where a notebook runs."""
     (profile / "startup").mkdir(parents=True)
     # the kernel serves this build alone, on this machine: that it does so without encryption is no news
     (profile / "ipython_kernel_config.py").write_text("get_config().IPKernelApp.log_level = 40\n", encoding="utf-8")
-    (profile / "startup" / "environment.py").write_text(
-        "import os, sys\nos.path.lexists('.venv') or os.symlink(sys.prefix, '.venv')\n", encoding="utf-8"
-    )
+    (profile / "startup" / "environment.py").write_text(STARTUP, encoding="utf-8")
