@@ -125,7 +125,7 @@ def _quantiles(output: Mapping[str, Any], *, drawn: bool) -> Table:
     if (e := output["beyond_limit"]) is not None:
         failed = f", {e['failed']} failed" if e["failed"] else ""
         rows.append([f"{e['beyond']} {e['limit'] * factor:.4g}{known}", f"{e['hits']} of {e['cases']}{failed}", "", ""])
-    how = "Intervals by order statistics and Clopper-Pearson." if drawn else "The cases of a plan are no draws."
+    how = "Intervals by order statistics and Clopper-Pearson." if drawn else "The cases of a plan are no random sample."
     missing = f"; {output['missing']} have no such measure" if output["missing"] else ""
     return Table(
         columns=(f"{output['name']}{known and ','}{known}", "", "interval from", "to")[: 4 if drawn else 2],

@@ -12,11 +12,13 @@ from rollover.system.errors import excerpt
 def rops(answer: Mapping[str, Any], folder: str) -> None:
     """Loads, hinges in their order and verdicts of a frame alone."""
     from rollover.assessment.stand_results import findings
+    from viz.pages.rops import headline
 
     out = terminal.out()
     out.print(
         f"{excerpt(answer['vehicle'])}, {answer['mass']:g} kg; frame of {answer['frame_mass']:.1f} kg", style="bold"
     )
+    out.print(headline(answer), style="bold")
     for c in answer["criteria"]:
         style = {"met": "green", "not met": "bold red"}.get(c["verdict"], "yellow")
         out.print(

@@ -100,8 +100,8 @@ def calibration(found: Calibration, folder: str) -> None:
     if (drawn := found.posterior) is not None:
         worst, least = float(drawn.r_hat.max()), float(drawn.effective.min())
         out.print(
-            f"posterior: {len(drawn.draws)} draws by {drawn.sampler}, R-hat up to {worst:.3f}, autocorrelation time up "
-            f"to {float(drawn.autocorrelation.max()):.2g} steps, {least:.0f} independent draws at least"
+            f"posterior: {len(drawn.draws)} samples by {drawn.sampler}, R-hat up to {worst:.3f}, autocorrelation time "
+            f"up to {float(drawn.autocorrelation.max()):.2g} steps, {least:.0f} independent samples at least"
         )
     for warning in found.warnings:
         out.print(warning, style="yellow")
