@@ -34,9 +34,10 @@ for name in ("FORCE_COLOR", "CLICOLOR_FORCE", "CLICOLOR", "PY_COLORS"):
 
 @register_cell_magic
 def sh(line, cell):  # IPython's own shows output in pieces of 100 bytes, each as a line of its own once it is merged
-    done = subprocess.run(cell, shell=True, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    print("\\n".join(row.rstrip() for row in done.stdout.splitlines()))
-    done.check_returncode()
+    done = subprocess.run(cell, shell=True, text=True, capture_output=True)
+    if done.returncode:
+        raise RuntimeError(done.stdout + done.stderr)
+    print("\\n".join(row.rstrip() for row in done.stdout.splitlines()))  # what tells the progress is left out
 """
 
 

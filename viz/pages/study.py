@@ -55,13 +55,14 @@ def page(study: Study, done: Conducted, report: Mapping[str, Any], *, command: s
     return render(
         title=report["title"],
         subtitle="Load study",
-        headline=_headline(report),
+        headline=headline(report),
         blocks=blocks,
         footer=Footer(command=command, scenario_hash=report["scenario_hash"], versions=report["versions"]),
     )
 
 
-def _headline(report: Mapping[str, Any]) -> Headline:
+def headline(report: Mapping[str, Any]) -> Headline:
+    """What the first output comes to: how often it lies beyond its limit or, without one, how far it goes."""
     n, first = report["cases"], report["outputs"][0]
     unit, factor = series_unit(first["unit"])
     failed = f"{n['failed']} of {n['all']} cases failed. " if n["failed"] else f"{n['all']} cases. "

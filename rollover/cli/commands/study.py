@@ -95,7 +95,9 @@ def study(
     if as_json:
         print(json.dumps(results.plain(report), indent=2))
     else:
-        console.tell("\n".join([*sentences(report), f"Results: {ready.folder}"]))
+        from viz.pages.study import headline
+
+        console.tell("\n".join([headline(report).sentence, *sentences(report), f"Results: {ready.folder}"]))
     if not report["cases"]["done"]:
         console.say(f"{path}: every case failed; the first: {report['failures'][0]['sentence']}")
         raise typer.Exit(FAILED)

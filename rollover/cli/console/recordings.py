@@ -20,9 +20,13 @@ if TYPE_CHECKING:
 def comparison(found: Sequence[Misfit], folder: str) -> None:
     """How well each recording is followed, a line for each channel."""
     from rollover.comparison.rating import Iso18571, NotRateable, verdict
+    from viz.pages.comparison import headline
 
     styles = {"good": "", "fair": "yellow", "poor": "bold red"}
     out = terminal.out()
+    told = headline(found)
+    out.print(told.sentence, style="bold")
+    out.print(told.detail)
     for each in found:
         out.print(each.recording, style="bold")
         table = Table(box=None, pad_edge=False)
@@ -74,7 +78,10 @@ def comparison(found: Sequence[Misfit], folder: str) -> None:
 
 def calibration(found: Calibration, folder: str) -> None:
     """Fitted values with their intervals, and what they gain."""
+    from viz.pages.calibration import headline
+
     out = terminal.out()
+    out.print(headline(found).sentence, style="bold")
     table = Table(box=None, pad_edge=False)
     for heading in ("parameter", "unit", "was", "is", "95 % from", "to", "", ""):
         table.add_column(heading, justify="right" if heading in ("was", "is", "95 % from", "to") else "left")

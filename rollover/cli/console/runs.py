@@ -143,6 +143,15 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
     from rollover.studies.baseline import unchanged, without_baseline
 
     out = terminal.out()
+    bad = sum(not a.ok for a in answers)
+    updated = sum(a.verdict == "updated" for a in answers)
+    written = "1 baseline written" if updated == 1 else f"{updated} baselines written"
+    verdict = written if updated else f"{bad} of {len(answers)} scenarios are not as they were"
+    if not bad and not updated:
+        verdict = unchanged(answers)
+    elif aside := without_baseline(answers):
+        verdict = f"{verdict}; {aside}"
+    out.print(f"{verdict[0].upper()}{verdict[1:]}.", style="bold", soft_wrap=True)
     table = Table(box=None, pad_edge=False)
     for heading in ("scenario", "", "runs", "wall s"):
         table.add_column(heading, justify="right" if heading in ("runs", "wall s") else "left")
@@ -169,12 +178,4 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
     for a in answers:
         for note in a.notes:
             out.print(f"{a.scenario}: {note}", style="yellow", soft_wrap=True)  # a command is copied as it stands
-    bad = sum(not a.ok for a in answers)
-    updated = sum(a.verdict == "updated" for a in answers)
-    written = "1 baseline written" if updated == 1 else f"{updated} baselines written"
-    verdict = written if updated else f"{bad} of {len(answers)} scenarios are not as they were"
-    if not bad and not updated:
-        verdict = unchanged(answers)
-    elif aside := without_baseline(answers):
-        verdict = f"{verdict}; {aside}"
-    out.print(f"{verdict[0].upper()}{verdict[1:]}. Everything: {folder}", style="bold")
+    out.print(f"Everything: {folder}")
