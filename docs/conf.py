@@ -6,6 +6,7 @@ import notebooks
 
 project = "rollover"
 author = "The rollover authors"
+project_copyright = author
 extensions = ["myst_nb"]  # myst_parser, and cells that are run
 myst_heading_anchors = 4  # links to headings, as repositories have them
 html_theme = "furo"

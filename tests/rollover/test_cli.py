@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 import types
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,6 +18,7 @@ import viz.pages
 import viz.recordings
 from rollover.assessment import assessed, loads, results
 from rollover.assessment.criterion import Criterion, compared, judged
+from rollover.cli import console
 from rollover.cli.main import app
 from rollover.dynamics import simulate
 from rollover.scenario import Scenario, load
@@ -251,10 +253,28 @@ def test_an_interrupt_leaves_nothing(bench: Bench, monkeypatch: pytest.MonkeyPat
     assert not Path("out").exists()
 
 
+def test_kernels_are_counted_while_they_are_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("ground.compiled.KEPT", tmp_path)
+    (tmp_path / "old.nbc").touch()
+    with console.compiling(True, every=0.01):
+        for name in ("a", "b"):
+            (tmp_path / name).mkdir()
+            (tmp_path / name / "kernel.nbc").touch()
+        time.sleep(0.3)
+    said = capsys.readouterr().err.splitlines()
+    assert "2 kernels compiled in " in said[-1]
+    assert len(said) <= 3, "nothing new, nothing said"
+    with console.compiling(False):
+        pass
+    assert not capsys.readouterr().err
+
+
 def test_the_first_run_says_that_it_compiles(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ground.compiled.is_warm", lambda *_: False)
     done = rollover("run", "drop_test")
-    assert done.stderr.startswith("Compiling the contact kernels, once per installation: about ")
+    assert done.stderr.startswith("Compiling the contact kernels, once per installation and once per new law: about ")
     assert done.stderr.count("\n") == 1
     assert "(most of it compiling, once)" in done.stdout, "its time tells no speed"
     monkeypatch.setattr("ground.compiled.is_warm", lambda *_: True)

@@ -14,7 +14,6 @@ import typer
 
 from rollover.cli.commands.common import (
     BROKE,
-    COMPILING,
     FAILED,
     NO,
     THE_ANSWER_IS_NO,
@@ -71,8 +70,6 @@ def run(
 
     path, chosen = scenario_with(scenario, set_)
     compiles = not is_warm(chosen.integrator)
-    if compiles:
-        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     from rollover.assessment import results
     from rollover.assessment.assessed import assessed
 
@@ -80,7 +77,7 @@ def run(
     made_from = results.origin(path, folder, set_ or [])
     # before a run that may take minutes
     results.claim(folder, document.content_hash(chosen), force=force, made_from=made_from, say=console.say)
-    with document.named(path):
+    with console.compiling(compiles), document.named(path):
         found = assessed(chosen, half_step=half_step, watch=_watched)
     done, again, rows = found.result, found.half_step, found.criteria
     if found.peaks and ensemble > 1:

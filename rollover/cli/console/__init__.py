@@ -1,5 +1,6 @@
 """What people read while a command works and when it is done: progress, tables, sentences. The only home of rich."""
 
+from rollover.cli.console.compiling import compiling
 from rollover.cli.console.frames import rops
 from rollover.cli.console.pairs import pair
 from rollover.cli.console.plans import plan
@@ -13,6 +14,7 @@ __all__ = [
     "Plain",
     "calibration",
     "comparison",
+    "compiling",
     "counting",
     "diagnosis",
     "pair",
