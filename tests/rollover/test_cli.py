@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 import types
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,7 +17,6 @@ import viz.pages
 import viz.recordings
 from rollover.assessment import assessed, loads, results
 from rollover.assessment.criterion import Criterion, compared, judged
-from rollover.cli import console
 from rollover.cli.main import app
 from rollover.dynamics import simulate
 from rollover.scenario import Scenario, load
@@ -69,6 +67,7 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Bench:
     log, report = types.ModuleType("viz.recordings.log"), types.ModuleType("viz.pages.report")
     log.write_rrd = lambda run, path, peaks, bands: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
     report.page = lambda run, peaks, answer, rows, command, near, bands: f"<p>{command}</p>"  # type: ignore[attr-defined]
+    report.headline = lambda *_: types.SimpleNamespace(sentence="The answer.")  # type: ignore[attr-defined]
     for module in (log, report):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr(assessed, "peak_loads", bench.peak_loads)
@@ -106,6 +105,7 @@ def test_run_writes_results_and_prints_peaks(bench: Bench) -> None:
     assert sorted(p.name for p in folder.iterdir()) == sorted(results.FILES)
     assert [s.simulation.step for s in bench.asked] == [0.0002, 0.0001]
     assert bench.asked[0] == load("drop_test")
+    assert done.stdout.splitlines()[1] == "The answer."
     assert "ground/force_normal *" in done.stdout
     assert "3.552" in done.stdout  # kN
     assert "calibrated domain: speed." in done.stdout
@@ -251,24 +251,6 @@ def test_an_interrupt_leaves_nothing(bench: Bench, monkeypatch: pytest.MonkeyPat
     done = rollover("run", "drop_test")
     assert (done.exit_code, done.stderr) == (130, "Interrupted.\n")
     assert not Path("out").exists()
-
-
-def test_kernels_are_counted_while_they_are_compiled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("ground.compiled.KEPT", tmp_path)
-    (tmp_path / "old.nbc").touch()
-    with console.compiling(True, every=0.01):
-        for name in ("a", "b"):
-            (tmp_path / name).mkdir()
-            (tmp_path / name / "kernel.nbc").touch()
-        time.sleep(0.3)
-    said = capsys.readouterr().err.splitlines()
-    assert "2 kernels compiled in " in said[-1]
-    assert len(said) <= 3, "nothing new, nothing said"
-    with console.compiling(False):
-        pass
-    assert not capsys.readouterr().err
 
 
 def test_the_first_run_says_that_it_compiles(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
