@@ -37,7 +37,8 @@ def sh(line, cell):  # IPython's own shows output in pieces of 100 bytes, each a
     done = subprocess.run(cell, shell=True, text=True, capture_output=True)
     if done.returncode:
         raise RuntimeError(done.stdout + done.stderr)
-    print("\\n".join(row.rstrip() for row in done.stdout.splitlines()))  # what tells the progress is left out
+    if done.stdout.strip():  # what tells the progress, on standard error, is left out
+        print("\\n".join(row.rstrip() for row in done.stdout.splitlines()))
 """
 
 
