@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,10 @@ BY_CI = "make demo"  # what .ci/run does by itself; here the line that make runs
 COMMANDS = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
 
 
+KEEPERS = (  # commands that leave a folder of results
+    "calibrate", "compare", "diagnose", "identify", "plan", "regress", "rolling", "rops", "run", "stability", "study",
+    "synthesize",
+)  # fmt: skip
 BLOCK = re.compile(r"(^<!-- not run: .*? -->\n)?^```(\w+)\n(.*?)^```$", flags=re.MULTILINE | re.DOTALL)
 ANSWERS = {  # tutorial -> what stands among the outputs on its page
     "first_overturn": ("ROPS force: at most", "Converged:", "A double click opens it", "within the step"),
@@ -242,6 +247,23 @@ def test_the_workflow_runs_what_the_page_of_the_gate_runs() -> None:
     (flow,) = (body for _, language, body in blocks(page) if language == "yaml" and not body.startswith("# "))
     steps = [step["run"] for step in YAML(typ="safe").load(flow)["jobs"]["regress"]["steps"] if "run" in step]
     assert {step for step in steps if step.startswith(".venv")} <= set(shell_lines(page))
+
+
+def test_no_page_writes_where_another_page_has_written() -> None:
+    """Who follows all pages in one folder is not refused: a folder of results is that of one command alone."""
+    wrote: dict[str, set[str]] = {}
+    for page in (*RUN, *TUTORIALS):
+        for line in shell_lines(page):
+            words = shlex.split(line)
+            if "rollover" not in words[0] or len(words) < 3 or words[1] not in KEEPERS:
+                continue
+            given = dict(pairwise(words))
+            folder = given.get("--out", f"out/{words[1]}/{Path(words[2]).stem}")
+            wrote.setdefault(f"{folder}/{given.get('--name', '')}", set()).add(f"{page}: {line}")
+    commands = {place: {line.partition(": ")[2] for line in lines} for place, lines in wrote.items()}
+    assert not [wrote[place] for place, lines in commands.items() if len(lines) > 1]
+    inside = [(a, b) for a in wrote for b in wrote if b != a and b.startswith(a) and "--name" not in str(wrote[a])]
+    assert not [(wrote[a], wrote[b]) for a, b in inside]
 
 
 def test_commands_named_in_passing_exist() -> None:
