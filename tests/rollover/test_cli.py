@@ -141,6 +141,7 @@ def test_require_says_no_by_name(bench: Bench) -> None:
     said = "not met: OECD Code 4 / ISO 5700: side load, got 4.2 kJ; asked: at least 5.25 kJ. given up\n"
     assert done.stderr.endswith(said)
     assert done.stderr.count("not met") == 1
+    assert done.stdout.splitlines()[2] == "Not met: side load."
     assert results.read_run_json(Path("out/run/drop_test"))["criteria"][0]["verdict"] == "not met"
     as_json = rollover("run", "drop_test", "--require", "--json")
     assert as_json.exit_code == 1

@@ -38,7 +38,7 @@ def report(
     out = terminal.out()
     out.print(excerpt(run.scenario.title), style="bold")
     if run.status == "done":
-        out.print(headline, style="bold")
+        _answer(out, headline, rows)
     if (made_from := origin(run.scenario)) and made_from.differences:
         out.print(f"{made_from.in_words}.", style="yellow")
     if run.status == "done":
@@ -77,6 +77,12 @@ def report(
     if half is not None and half["status"] != "done":
         out.print(f"At half the step the run failed: {half['sentence']}", style="yellow")
     out.print(f"Results: {folder}")
+
+
+def _answer(out: Console, headline: str, rows: Sequence[Criterion]) -> None:
+    out.print(headline, style="bold")
+    if missed := [row.requirement.name for row in rows if row.verdict == "not met"]:
+        out.print(f"Not met: {', '.join(missed)}.", style="bold red")
 
 
 def _convergence(out: Console, peaks: Sequence[PeakLoad]) -> None:
