@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rollover.assessment.results import versions
-from rollover.studies.baseline import Answer, Difference, unchanged
+from rollover.studies.baseline import Answer, Difference
+from rollover.studies.regression import unchanged
 from viz.content.blocks import Block, Cell, Details, Footer, Headline, Note, Section, Table, as_sentence
 from viz.pages.page import render
 from viz.pages.report import number, series_unit

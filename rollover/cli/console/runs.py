@@ -146,7 +146,7 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
 
 def regression(answers: Sequence[Answer], folder: str) -> None:
     """What changed, and one line for each scenario, on standard output."""
-    from rollover.studies.baseline import unchanged, without_baseline
+    from rollover.studies.regression import unchanged, without_baseline
 
     out = terminal.out()
     bad = sum(not a.ok for a in answers)
