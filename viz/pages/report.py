@@ -216,7 +216,7 @@ def _domain(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
     return [Section(title="Calibrated domain", blocks=[Note(text=text, warning=True), table])]
 
 
-def _histories(run: Run, peaks: Sequence[PeakLoad], bands: Sequence[Band]) -> list[Block]:
+def _histories(run: Run, peaks: Sequence[PeakLoad], bands: Sequence[Band] = ()) -> list[Block]:
     cfc, time = run.scenario.loads.cfc, run.recording.time
     figures: list[Block] = []
     shared: dict[tuple[str, str], list[Curve]] = {}  # by what is drawn and its unit: one axis, one quantity
