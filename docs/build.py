@@ -1,7 +1,8 @@
 """The documentation site: `python docs/build.py [FOLDER]` collects pages, adds the reference, and builds them strict.
 
 Pages stay where they are read in the repository; what is built is a copy in which links to files that are no page are
-plain text. Notebooks among them are run. No network is needed: theme and search come with the packages.
+plain text. Tutorials become notebooks, which are run (`notebooks.py`). No network is needed: theme and search come
+with the packages.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import notebooks
 import reference
 
 ROOT = Path(__file__).resolve().parents[1]
 HERE = ROOT / "docs"
+TUTORIALS = HERE / "tutorials"
 SITE = {  # caption -> pages, in the order of the menu
     "Tutorials": [
         f"docs/tutorials/{n}"
@@ -69,7 +72,8 @@ def stage(folder: Path) -> None:
     for page in [ROOT / "README.md", *pages]:
         goal = folder / ("index.md" if page == ROOT / "README.md" else page.relative_to(ROOT))
         goal.parent.mkdir(parents=True, exist_ok=True)
-        goal.write_text(_linked(page, {ROOT / "README.md", *pages}, folder), encoding="utf-8")
+        text = _linked(page, {ROOT / "README.md", *pages}, folder)
+        goal.write_text(notebooks.notebook(text, page.stem) if page.parent == TUTORIALS else text, encoding="utf-8")
     generated = reference.pages()
     (folder / "reference").mkdir()
     for name, text in generated.items():
@@ -116,10 +120,7 @@ def build(site: Path) -> int:
     stage(source)
     strict = ["--fail-on-warning", "--keep-going", "--nitpicky", "--quiet"]
     os.environ["IPYTHONDIR"] = str(source / "ipython")  # nobody's own start-up files take part in a notebook
-    profile = source / "ipython" / "profile_default"
-    profile.mkdir(parents=True)
-    # the kernel serves this build alone, on this machine: that it does so without encryption is no news
-    (profile / "ipython_kernel_config.py").write_text("get_config().IPKernelApp.log_level = 40\n", encoding="utf-8")
+    notebooks.prepare(source / "ipython" / "profile_default")
     return int(build_main([*strict, "-b", "html", "-c", str(HERE), str(source), str(site)]))
 
 

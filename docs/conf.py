@@ -1,10 +1,17 @@
 """Sphinx: Markdown and notebooks, a theme without fonts or scripts from elsewhere; `build.py` makes warnings errors."""
 
+from typing import Any
+
+import notebooks
+
 project = "rollover"
 author = "The rollover authors"
+project_copyright = author
 extensions = ["myst_nb"]  # myst_parser, and cells that are run
 myst_heading_anchors = 4  # links to headings, as repositories have them
 html_theme = "furo"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 html_title = "rollover"
 html_show_sphinx = False
 html_copy_source = False
@@ -15,3 +22,8 @@ nb_execution_timeout = 1800  # s for each cell: the first one may have to compil
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 nb_render_markdown_format = "myst"
+
+
+def setup(app: Any) -> None:
+    """Draw the cells of a shell as what a terminal takes."""
+    app.connect("doctree-read", notebooks.shown)

@@ -145,8 +145,6 @@ def run(scenario: str | Path | Scenario, *, half_step: bool = True, ensemble: in
     RuntimeError
         Where another start of the ensemble failed.
     """
-    from dataclasses import replace
-
     from rollover.assessment.assessed import assessed
     from rollover.scenario import given
     from rollover.spec.document import named
@@ -159,13 +157,15 @@ def run(scenario: str | Path | Scenario, *, half_step: bool = True, ensemble: in
         found = assessed(chosen, half_step=half_step, page=_page)
     if ensemble == 1 or not found.peaks:
         return found
-    return replace(found, peaks=with_scatter(found.peaks, chosen, ensemble, workers))
+    return with_scatter(found, ensemble, workers)
 
 
 def _page(of: Run) -> str:
     from viz.pages.report import page
 
-    return page(of.result, of.peaks, of.as_dict, rows=of.criteria, near=of.approaches, command="rollover.run(scenario)")
+    command = "rollover.run(scenario)"
+    rows, near, bands = of.criteria, of.approaches, of.bands
+    return page(of.result, of.peaks, of.as_dict, rows=rows, near=near, bands=bands, command=command)
 
 
 def compare(

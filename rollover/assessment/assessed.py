@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from rollover.assessment import results
+from rollover.assessment.bands import Band
 from rollover.assessment.clearance import Approach, approaches
 from rollover.assessment.criteria import criteria, with_half_step
 from rollover.assessment.criterion import Criterion
@@ -33,7 +34,7 @@ class AssessedRun:
     """A run, the same at half the step if that was asked for, its peak loads, and what it was held against.
 
     `approaches` say how near the clearance zone was come to; `peaks` are empty for a run that failed: the peak until
-    then is not the peak. `page` gives the report's HTML.
+    then is not the peak. `bands` are those of an ensemble. `page` gives the report's HTML.
     """
 
     result: Run
@@ -41,6 +42,7 @@ class AssessedRun:
     peaks: tuple[PeakLoad, ...]
     criteria: tuple[Criterion, ...]
     approaches: tuple[Approach, ...] = ()
+    bands: tuple[Band, ...] = ()
     page: Callable[[AssessedRun], str] | None = field(default=None, repr=False, compare=False)
 
     @property

@@ -171,7 +171,7 @@ def _draws(c: Conclusion) -> Draws | None:
     """Draws of what is named, where they were asked for; none of what recordings show by themselves."""
     if not c.asked.draws or c.shown is not None or c.acts != "drop":
         return None
-    c.asked.say("draws of what is left open of the numbers")
+    c.asked.say("samples of the posterior of the numbers")
     return drawn(c.problem, c.explanation.fitted, c.asked.draws)
 
 

@@ -119,12 +119,6 @@ class Difference:
     same: bool
 
 
-def unchanged(count: int) -> str:
-    """That nothing has changed in so many scenarios, in words."""
-    which = "" if count == 1 else f" of {count} scenarios"
-    return f"no peak load{which} has moved beyond its tolerance"
-
-
 @dataclass(frozen=True, kw_only=True)
 class Answer:
     """One scenario against its baseline. `same`, `excluded` and `updated` are good; all else is a failure."""

@@ -13,8 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rollover.assessment.assessed import AssessedRun
+from rollover.assessment.bands import History, bands, history
 from rollover.assessment.ledger import Closure, closure
-from rollover.assessment.loads import PeakLoad, peak_loads
+from rollover.assessment.loads import peak_loads
 from rollover.dynamics import simulate
 from rollover.dynamics.result import Run
 from rollover.scenario import Scenario
@@ -122,6 +124,14 @@ def measured(scenario: Scenario) -> tuple[Extreme, ...]:
     return observed(scenario).extremes
 
 
+def followed(scenario: Scenario) -> tuple[tuple[Extreme, ...], History]:
+    """Run a scenario for its extremes and its loads over time. Raises `FailedRunError`."""
+    run = simulate.run(scenario)
+    if run.status == "failed":
+        raise FailedRunError(run.sentence)
+    return extremes(run), history(run)
+
+
 def spreads(ensemble: Sequence[Sequence[Extreme]]) -> tuple[Spread, ...]:
     """Mean and values of each quantity over the starts; those of the first start, in its order."""
     by_key = [{e.key: e.value for e in start} for start in ensemble]
@@ -141,24 +151,25 @@ def spreads(ensemble: Sequence[Sequence[Extreme]]) -> tuple[Spread, ...]:
     return tuple(found)
 
 
-def with_scatter(
-    peaks: Sequence[PeakLoad], scenario: Scenario, starts: int, workers: int | None = None
-) -> tuple[PeakLoad, ...]:
-    """Peaks of a run with mean and scatter over it and `starts` - 1 neighbours, which run in child processes.
+def with_scatter(found: AssessedRun, starts: int, workers: int | None = None) -> AssessedRun:
+    """A run with mean and scatter of its peaks, and bands of its loads, over it and `starts` - 1 neighbours.
 
-    Raises `FailedRunError` if one of them fails.
+    These run in child processes. Raises `FailedRunError` if one of them fails.
     """
-    ensemble = [{(p.channel, f"CFC {p.cfc}"): p.filtered for p in peaks}]
-    others = [s.of_many() for s in neighbours(scenario, starts)[1:]]
-    for outcome in map_cases(measured, others, workers=workers):
+    ensemble = [{(p.channel, f"CFC {p.cfc}"): p.filtered for p in found.peaks}]
+    others = [s.of_many() for s in neighbours(found.scenario, starts)[1:]]
+    histories = []
+    for outcome in map_cases(followed, others, workers=workers):
         if outcome.value is None:
             assert outcome.failure is not None
             raise FailedRunError(f"neighbouring start {outcome.index + 2} of {starts}: {outcome.failure.sentence}")
-        ensemble.append({e.key: e.value for e in outcome.value})
-    found = []
-    for peak in peaks:
+        told, over_time = outcome.value
+        ensemble.append({e.key: e.value for e in told})
+        histories.append(over_time)
+    peaks = []
+    for peak in found.peaks:
         values = [start[peak.channel, f"CFC {peak.cfc}"] for start in ensemble]
         mean = statistics.fmean(values)
         scatter = statistics.stdev(values) / mean if mean > 0.0 else 0.0
-        found.append(replace(peak, starts=starts, mean=mean, scatter=scatter, starts_by=others[0].integrator))
-    return tuple(found)
+        peaks.append(replace(peak, starts=starts, mean=mean, scatter=scatter, starts_by=others[0].integrator))
+    return replace(found, peaks=tuple(peaks), bands=bands(found.result, histories))

@@ -143,6 +143,23 @@ def compared(
     return sorted(answers, key=lambda a: order.get(a.scenario, len(order)))
 
 
+def unchanged(answers: Sequence[Answer]) -> str:
+    """That nothing has changed in the scenarios that have a baseline, in words; and which have none on purpose."""
+    held = sum(a.verdict != "excluded" for a in answers)
+    which = "" if held == 1 else f" of {held} scenarios"
+    moved = f"no peak load{which} has moved beyond its tolerance" if held else "nothing was compared"
+    return "; ".join(filter(None, (moved, without_baseline(answers))))
+
+
+def without_baseline(answers: Sequence[Answer]) -> str:
+    """Which scenarios are excluded, and what gives them a baseline; empty where none is."""
+    names = [a.scenario for a in answers if a.verdict == "excluded"]
+    if not names:
+        return ""
+    line = "its line" if len(names) == 1 else "their lines"
+    return f"excluded, {line} in {baselines.FOLDER}/{baselines.EXCLUDED} removed gives a baseline: {', '.join(names)}"
+
+
 class FailedUpdateError(Exception):
     """No baseline was written, as a run failed; `answers` say which."""
 

@@ -22,10 +22,10 @@ COUNTED = ("start/from_rest",)  # 0 or 1 in each case: a share, without quantile
 ENDS = 0.2  # share of the cases that stand for an axis' low and high end
 
 DRAWN = {
-    "random": "independent draws: intervals are exact",
-    "lhs": "a Latin hypercube: intervals are those of independent draws, which for it are rather too wide",
-    "sobol": "a Sobol sequence: intervals are those of independent draws, which for it are rather too wide",
-    "sobol-indices": "quantiles over the first half of Saltelli's points; intervals are those of independent draws",
+    "random": "independent samples: intervals are exact",
+    "lhs": "a Latin hypercube: intervals are those of independent samples, which for it are rather too wide",
+    "sobol": "a Sobol sequence: intervals are those of independent samples, which for it are rather too wide",
+    "sobol-indices": "quantiles over the first half of Saltelli's points; intervals are those of independent samples",
 }
 
 
@@ -43,7 +43,7 @@ def answers(study: Study, done: Conducted) -> dict[str, Any]:
         "cases": _counts(rows),
         "drawn": drawn,
         "meaning_of_quantiles": DRAWN.get(
-            study.plan.kind, "the cases of a plan, which are no draws: they tell the range"
+            study.plan.kind, "the cases of a plan, which are no random sample: they tell the range"
         ),
         "from_rest": sum(row.measures.get("start/from_rest", 0.0) > 0.0 for row in rows),
         "outputs": [_output(study, output, done, chosen, drawn) for output in study.outputs],
@@ -110,7 +110,7 @@ def quantile(values: Array, q: float, confidence: float) -> dict[str, Any]:
     """Quantile with its interval by order statistics, which holds for any distribution.
 
     P(x_(l) <= x_q < x_(u)) = sum_{k=l}^{u-1} C(n,k) q^k (1-q)^(n-k) >= confidence; an end that n values do not bound is
-    None. `values` (n,) are independent draws.
+    None. `values` (n,) are independent samples.
     """
     from scipy.stats import binom
 

@@ -110,7 +110,7 @@ def test_nothing_named_has_no_draws(tmp_path: Path) -> None:
         write_recording(recording, tmp_path / "rec" / f"{name}.csv")
     done = asked("drop_test", tmp_path / "rec", "--workers", "0", "--out", tmp_path / "out", "--posterior")
     assert done.exit_code == 0, done.output
-    assert "nothing is named, so that there are no draws" in done.output
+    assert "nothing is named, so that there are no samples" in done.output
     assert "posterior" not in json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert not (tmp_path / "out" / "posterior.csv").exists()
 

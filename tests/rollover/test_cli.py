@@ -65,8 +65,9 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Bench:
     monkeypatch.setattr(simulate, "run", bench.run)
     monkeypatch.setattr("ground.compiled.is_warm", lambda *_: True)
     log, report = types.ModuleType("viz.recordings.log"), types.ModuleType("viz.pages.report")
-    log.write_rrd = lambda run, path, peaks: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
-    report.page = lambda run, peaks, answer, rows, command, near: f"<p>{command}</p>"  # type: ignore[attr-defined]
+    log.write_rrd = lambda run, path, peaks, bands: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
+    report.page = lambda run, peaks, answer, rows, command, near, bands: f"<p>{command}</p>"  # type: ignore[attr-defined]
+    report.headline = lambda *_: types.SimpleNamespace(sentence="The answer.")  # type: ignore[attr-defined]
     for module in (log, report):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr(assessed, "peak_loads", bench.peak_loads)
@@ -104,6 +105,7 @@ def test_run_writes_results_and_prints_peaks(bench: Bench) -> None:
     assert sorted(p.name for p in folder.iterdir()) == sorted(results.FILES)
     assert [s.simulation.step for s in bench.asked] == [0.0002, 0.0001]
     assert bench.asked[0] == load("drop_test")
+    assert done.stdout.splitlines()[1] == "The answer."
     assert "ground/force_normal *" in done.stdout
     assert "3.552" in done.stdout  # kN
     assert "calibrated domain: speed." in done.stdout
@@ -139,6 +141,7 @@ def test_require_says_no_by_name(bench: Bench) -> None:
     said = "not met: OECD Code 4 / ISO 5700: side load, got 4.2 kJ; asked: at least 5.25 kJ. given up\n"
     assert done.stderr.endswith(said)
     assert done.stderr.count("not met") == 1
+    assert done.stdout.splitlines()[2] == "Not met: side load."
     assert results.read_run_json(Path("out/run/drop_test"))["criteria"][0]["verdict"] == "not met"
     as_json = rollover("run", "drop_test", "--require", "--json")
     assert as_json.exit_code == 1
@@ -254,7 +257,7 @@ def test_an_interrupt_leaves_nothing(bench: Bench, monkeypatch: pytest.MonkeyPat
 def test_the_first_run_says_that_it_compiles(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ground.compiled.is_warm", lambda *_: False)
     done = rollover("run", "drop_test")
-    assert done.stderr.startswith("Compiling the contact kernels, once per installation: about ")
+    assert done.stderr.startswith("Compiling the contact kernels, once per installation and once per new law: about ")
     assert done.stderr.count("\n") == 1
     assert "(most of it compiling, once)" in done.stdout, "its time tells no speed"
     monkeypatch.setattr("ground.compiled.is_warm", lambda *_: True)

@@ -15,6 +15,7 @@ from rollover.recording import Recording, write_parquet
 from rollover.scenario import AnyLaw, load
 from rollover.spec import document
 from tests.ground.recorded_drops import TRUTH, recorded
+from tests.viz.html import Parts
 
 
 def files(folder: Path, *, noise: float = 0.005, speeds: tuple[float, ...] = (1.0, 2.0, 3.0, 3.5)) -> list[str]:
@@ -50,7 +51,7 @@ def test_it_writes_a_soil_that_a_scenario_takes(tmp_path: Path) -> None:
     out = tmp_path / "soil"
     done = call(*names, "--out", str(out))
     assert done.exit_code == 0, done.output
-    assert sorted(p.name for p in out.iterdir()) == ["identify.json", "soil.yaml"]
+    assert sorted(p.name for p in out.iterdir()) == ["identify.json", "report.html", "soil.yaml"]
     law = document.load(out / "soil.yaml", AnyLaw)
     assert isinstance(law, Ye2006)
     assert law.second_stiffness == pytest.approx(TRUTH["second_stiffness"], rel=0.03)
@@ -61,6 +62,13 @@ def test_it_writes_a_soil_that_a_scenario_takes(tmp_path: Path) -> None:
     assert [mark.split(" sha256:")[0] for mark in law.calibration.recordings] == [Path(n).stem for n in names]
     assert all(len(mark.split(":")[1]) == 64 for mark in law.calibration.recordings)
     assert "second_stiffness" in done.output
+    page = Parts((out / "report.html").read_text())
+    answer = f"Law ye-2006 from {len(names)} drops: 6 of 6 coefficients are determined."
+    assert done.stdout.startswith(answer)
+    assert answer in page.said
+    assert {"law, at the speed of each drop", "stiffness F/z, kN/m"} <= {*page.words}
+    (row,) = (row for row in page.rows if row[0] == "second_stiffness")
+    assert float(row[1]) == pytest.approx(law.second_stiffness, rel=1e-4)
     assert "R = 1.000 (the paper: 0.923)" in done.output
 
 

@@ -14,6 +14,8 @@ import pytest
 from typer.testing import CliRunner
 
 from rollover import studies
+from rollover.assessment.assessed import assessed
+from rollover.assessment.bands import History, bands, history
 from rollover.assessment.results import plain
 from rollover.cli.main import app
 from rollover.dynamics import simulate
@@ -306,12 +308,28 @@ def test_neighbours_of_a_run_are_many_and_the_run_is_not(monkeypatch: pytest.Mon
     simulate_run = simulate.run
     monkeypatch.setattr(simulate, "run", seen)
     scenario = load("drop_test")
-    from rollover.assessment.loads import peak_loads
-
-    peaks = with_scatter(peak_loads(simulate.run(scenario)), scenario, 3, workers=0)
+    found = with_scatter(assessed(scenario, half_step=False), 3, workers=0)
+    peaks = found.peaks
     assert made == ["exudyn", "compiled", "compiled"]
     assert all(p.scatter is not None and p.scatter < 1e-5 for p in peaks)
     assert {p.starts_by for p in peaks} == {"compiled"}
+    (band,) = found.bands
+    assert (band.channel, band.starts, band.cfc) == ("ground/force_normal", 3, 60)
+    assert band.mean.max() == pytest.approx(peaks[0].mean, rel=1e-5)
+    assert 0.0 < band.deviation.max() < 1e-4 * band.mean.max()
+
+
+def test_a_band_is_mean_and_deviation_at_each_instant() -> None:
+    """Of loads F and 1.2 F the mean is 1.1 F and the standard deviation 0.2 F/sqrt(2); none once one has ended."""
+    run = simulate.run(load("drop_test"))
+    (force,) = history(run).loads.values()
+    ended = run.recording.time.size - 50
+    other = History(time=run.recording.time[:ended], loads={"ground/force_normal": 1.2 * force[:ended]})
+    (band,) = bands(run, [other])
+    np.testing.assert_allclose(band.mean[:ended], 1.1 * force[:ended], rtol=1e-12)
+    np.testing.assert_allclose(band.deviation[:ended], 0.2 / np.sqrt(2.0) * force[:ended], rtol=1e-9)
+    assert np.isnan(band.mean[ended:]).all()
+    assert bands(run, []) == ()
 
 
 # ---------------------------------------------------------------- --set

@@ -126,8 +126,12 @@ def test_the_command(folders: tuple[Path, Path], tmp_path: Path) -> None:
     page = (out / "report.html").read_text()
     assert "not met" in page
     assert "candidate less baseline" in page
+    assert page.index("<svg") < page.index("<table"), "curves first"
     text = CliRunner().invoke(app, words)
-    assert "| Ground force | 10.0 kN | 8.00 kN | -20 % | changed |" in text.stdout
+    first, *rows = [line.split() for line in text.stdout.splitlines()]
+    assert " ".join(first) == answer["answer"]
+    assert ["Ground", "force", "10.0", "kN", "8.00", "kN", "-20", "%", "changed"] in rows
+    assert ["initiation.speed", "3.0", "m/s", "2.0", "m/s"] in rows
     turned = CliRunner().invoke(app, ["compare", str(folders[1]), str(folders[0]), "--out", str(out)])
     assert (turned.exit_code, "--force" in turned.stderr) == (2, True)
 

@@ -100,7 +100,7 @@ def test_the_draws_of_a_calibration_agree_with_its_intervals(drops: Path, tmp_pa
     words = ["calibrate", "drop_test", str(drops), *fit, "--out", str(out)]
     done = asked(*words, "--posterior", "--draws", "1000")
     assert done.exit_code == 0, done.output
-    assert "posterior: 1000 draws by emcee" in done.output
+    assert "posterior: 1000 samples by emcee" in done.output
     answer = json.loads((out / "calibrate.json").read_text())
     told = answer["posterior"]
     assert told["draws"] == 1000
@@ -125,7 +125,7 @@ def test_the_draws_of_a_calibration_agree_with_its_intervals(drops: Path, tmp_pa
     assert told["correlation"][0][1] == pytest.approx(answer["correlation"][0][1], abs=0.1)
     page = (out / "report.html").read_text()
     assert "What stays open" in page
-    assert "Draws of the posterior" in page
+    assert "Samples of the posterior" in page
     without = asked(*words, "--force")
     assert without.exit_code == 0, without.output
     again = json.loads((out / "calibrate.json").read_text())

@@ -154,6 +154,12 @@ def test_a_missing_baseline_an_unknown_one_and_one_left_out(folder: Path) -> Non
     (folder / "baselines" / "excluded.yaml").write_text(text)
     done = regress(folder, "--force")
     assert (done.exit_code, "excluded" in done.stdout, "a sketch" in done.stdout) == (0, True, True)
+    none = "excluded, its line in baselines/excluded.yaml removed gives a baseline: new."
+    assert f"No peak load of 2 scenarios has moved beyond its tolerance; {none}" in done.stdout
+    for more in ((), ("--update", "--reason", "now")):
+        done = regress(folder / "new.yaml", "--force", *more)
+        assert (done.exit_code, f"Nothing was compared; {none}" in done.stdout) == (0, True)
+    assert not (folder / "baselines" / "new.yaml").exists()
     (folder / "baselines" / "excluded.yaml").write_text(
         text + "  - {name: drop, reason: no}\n  - {name: drp, reason: no}\n"
     )

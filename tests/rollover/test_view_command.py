@@ -39,7 +39,7 @@ def view(*words: object) -> Any:
 def test_it_says_what_it_rests_on(results: Path, made: list[dict[str, Any]]) -> None:
     done = view(results, "--html", "drop.html")
     assert done.exit_code == 0, done.output
-    assert "Written: drop.html" in done.stderr
+    assert "Written: drop.html" in done.stdout
     (call,) = made
     answer = store.read_run_json(results)
     assert call["recording"] == results / "recording.rrd"

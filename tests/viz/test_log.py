@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rollover.assessment.bands import Band
 from rollover.dynamics.result import GroundTrack, Run
 from rollover.spec.vehicle import Vehicle
 from tests.viz import example
@@ -37,8 +38,8 @@ def one(path: Path, entity: str, component: str) -> Any:
     return rows[0]
 
 
-def flat(path: Path, entity: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    time, rows = read_column(path, entity, "Scalars:scalars")
+def flat(path: Path, entity: str, component: str = "Scalars:scalars") -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    time, rows = read_column(path, entity, component)
     return time, np.array([row[0] for row in rows])
 
 
@@ -113,6 +114,20 @@ def test_gaps_stay_gaps(drop: Run, tmp_path: Path) -> None:
     log.write_rrd(dataclasses.replace(drop, recording=recording), tmp_path / "gap.rrd")
     _, plotted = flat(tmp_path / "gap.rrd", "/" + series("ground/force_normal").simulated)
     np.testing.assert_array_equal(plotted, force * 1e-3)
+
+
+def test_a_band_of_neighbours_joins_the_plot_of_its_load(overturn: Run, tmp_path: Path) -> None:
+    time, force = overturn.recording.time, overturn.recording["rops/force"]
+    band = Band(channel="rops/force", cfc=60, starts=3, time=time, mean=force, deviation=0.1 * force)
+    log.write_rrd(overturn, tmp_path / "band.rrd", bands=[band])
+    entity = "/" + series("rops/force").neighbours
+    assert entity.startswith("/" + series("rops/force").path + "/"), "the plot shows what lies below its path"
+    (at, mean), (_, variance) = (
+        flat(tmp_path / "band.rrd", entity, f"Measurements:{c}") for c in ("values", "variances")
+    )
+    np.testing.assert_array_equal(at, stamps(time).astype(np.int64))
+    np.testing.assert_allclose(mean, 1e-3 * force, rtol=1e-6)
+    np.testing.assert_allclose(variance, (1e-4 * force) ** 2, rtol=1e-5)
 
 
 @pytest.mark.parametrize("member", ["left_post", "right_post", "crossbar"])

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from rollover.assessment.bands import Band
 from rollover.assessment.clearance import approaches
 from rollover.assessment.criteria import Criterion
 from rollover.assessment.loads import PeakLoad, peak_loads
@@ -100,7 +101,7 @@ def test_the_pages_numbers_are_those_of_run_json(folder: Path) -> None:
     assert shown["raw"] == f"{peak['raw'] / 1e3:.4g}"
     assert shown["CFC 60"] == f"{peak['filtered'] / 1e3:.4g}"
     assert row[3] == f"{peak['raw_time']:.3f}"
-    assert shown["impulse, N s"] == f"{peak['impulse']:.4g}"
+    assert shown["impulse, N\N{NO-BREAK SPACE}s"] == f"{peak['impulse']:.4g}"
     assert shown["change at half step"] == f"{100 * peak['half_step_change']:.2g} %"
     assert (peak["starts"], shown["mean of 2"]) == (2, f"{peak['mean'] / 1e3:.4g}")
     assert shown["scatter"] == f"{100 * peak['scatter']:.2g} %"
@@ -127,6 +128,12 @@ def test_the_page_of_an_overturn(overturn: Run, peaks: tuple[PeakLoad, ...]) -> 
     assert residual in parts.said
     assert "OECD Code 4 / ISO 5700: side load" in " ".join(parts.words)
     assert "clearance zone" in parts.said
+    assert "neighbouring starts" not in parts.said
+    time, force = overturn.recording.time, overturn.recording["rops/force"]
+    band = Band(channel="rops/force", cfc=60, starts=3, time=time, mean=force, deviation=0.1 * force)
+    parts = Parts(report.page(overturn, peaks, ANSWER, bands=[band]))
+    assert "Band: standard deviation over 3 neighbouring starts." in parts.said
+    assert "mean of 3" in " ".join(parts.words)
 
 
 def test_the_same_run_gives_the_same_page(overturn: Run, peaks: tuple[PeakLoad, ...]) -> None:

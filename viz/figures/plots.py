@@ -46,13 +46,17 @@ LINEAR = 10.0  # times the noise up to which the axis of a diagnosis' residual i
 
 @dataclass(frozen=True, kw_only=True)
 class Curve:
-    """`y` (n,) over `x` (n,); gaps are NaN. `name` stands in the legend, with the filter class where there is one."""
+    """`y` (n,) over `x` (n,); gaps are NaN. `name` stands in the legend, with the filter class where there is one.
+
+    `spread` (n,) is the half width of a band about it.
+    """
 
     name: str
     x: Array
     y: Array
     role: Role = "first"
     thin: bool = False  # as the raw one beside its filtered one
+    spread: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,21 +210,6 @@ def bars(values: Mapping[str, float], *, label: str, roles: Mapping[str, Role] |
     return svg.text
 
 
-def spans(names: Sequence[str], wide: Array, narrow: Array, was: Array, found: Array, *, label: str) -> str:
-    """For each name an interval and a narrower one within it, (n, 2) each, with a value before and after, (n,)."""
-    with _axes(height=0.8 + 0.32 * len(names)) as (axes, svg):
-        rows = np.arange(len(names))
-        axes.hlines(rows, *wide.T, color=COLOURS["muted"], lw=2.0, label="95 %")
-        axes.hlines(rows, *narrow.T, color=COLOURS["first"], lw=6.0, label="95 %, if the others were known")
-        for values, mark, role, name in ((was, "|", "second", "was"), (found, "o", "ink", "is")):
-            axes.plot(values, rows, ls="", marker=mark, ms=5 if mark == "o" else 11, color=COLOURS[role], label=name)
-        axes.set_yticks(rows, names)
-        axes.invert_yaxis()
-        finish(axes, label, "", margins=(0.03, 0.25))
-        axes.grid(axis="y", visible=False)
-    return svg.text
-
-
 def tornado(
     names: Sequence[str], low: Sequence[float], high: Sequence[float], *, centre: float, label: str, most: int = 16
 ) -> str:
@@ -311,6 +300,9 @@ def _draw(axes: Any, curves: Sequence[Curve]) -> None:
         width, alpha = (0.7, 0.55) if curve.thin else (1.4, 1.0)
         (line,) = axes.plot(x, y, color=COLOURS[curve.role], lw=width, alpha=alpha, label=curve.name)
         marked(axes, line)
+        if curve.spread is not None:
+            edges = curve.y - curve.spread, curve.y + curve.spread
+            axes.fill_between(curve.x, *edges, color=COLOURS[curve.role], alpha=0.25, lw=0)
 
 
 def _level(axes: Any, levels: Sequence[Level]) -> None:

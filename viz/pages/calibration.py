@@ -15,6 +15,7 @@ from viz.content.differences import differences_section
 from viz.content.entities import series
 from viz.figures import plots
 from viz.figures.heat_map import heat_map
+from viz.figures.intervals import spans
 from viz.figures.plots import Curve, Level
 from viz.pages.page import render
 from viz.pages.posterior import open_values
@@ -128,7 +129,7 @@ def _spans(c: Calibration) -> list[Block]:
         low, high = e.bounds
         return [100.0 * min(max((v - low) / (high - low), 0.0), 1.0) for v in values]
 
-    svg = plots.spans(
+    svg = spans(
         [e.path for e in c.estimates],
         np.array([share(e, e.low, e.high) for e in c.estimates]),
         np.array([share(e, e.alone_low, e.alone_high) for e in c.estimates]),

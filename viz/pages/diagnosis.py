@@ -81,7 +81,7 @@ def _found(found: Diagnosis) -> list[Block]:
     sections: list[Block] = [Section(title="What was found", blocks=[*notes, table])]
     if (d := found.posterior) is not None:
         prior = "Prior: uniform over the range of the search, of the logarithm where that is looked for."
-        beside = Note(text="What a small error of the model would do is in the intervals above, not in the draws.")
+        beside = Note(text="What a small error of the model would do is in the intervals above, not in the samples.")
         warnings = [Note(text=f"{as_sentence(w)}.", warning=True) for w in d.convergence.warnings]
         blocks = [*open_values(d.names, d.units, d.values, d.fitted, d.convergence, prior), *warnings, beside]
         sections.append(Section(title="What stays open", blocks=blocks))

@@ -1,4 +1,4 @@
-"""The page of two runs: which loads moved, what was changed, both histories with their difference."""
+"""The page of two runs: both histories with their difference, which loads moved, what was changed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from rollover.comparison.run_pair import Pair
 from rollover.system.numbers import percent
-from viz.content.blocks import Block, Cell, Figure, Footer, Headline, Note, Section, State, Table
+from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, State, Table
 from viz.content.entities import series
 from viz.content.pair_words import answer, both, detail, named, relative, value
 from viz.figures import plots
@@ -16,12 +16,13 @@ from viz.figures.plots import Curve
 from viz.pages.page import render
 from viz.pages.report import title
 
+OPEN = 12  # changed values that are not folded away
 SHOWN = ("rops/force", "device/force", "ground/force_normal", "rops/deflection", "ground/sinkage", "chassis/roll")
 
 
 def page(found: Pair, *, command: str, versions: Mapping[str, str]) -> str:
     """HTML of a baseline and a candidate."""
-    blocks = [*_loads(found), *_verdicts(found), *_changes(found), *_histories(found)]
+    blocks = [*_histories(found), *_loads(found), *_verdicts(found), *_changes(found)]
     return render(
         title=str(found.candidate.answer["title"]),
         subtitle="Two runs: baseline and candidate",
@@ -78,7 +79,12 @@ def _changes(found: Pair) -> list[Block]:
     if not found.changes:
         return [Section(title="What was changed", blocks=[Note(text="Nothing: both scenarios say the same.")])]
     rows = [[c.path, *both(c)] for c in found.changes]
-    return [Section(title="What was changed", blocks=[Table(columns=["value", "baseline", "candidate"], rows=rows)])]
+    columns = ["value", "baseline", "candidate"]
+    blocks: list[Block] = [Table(columns=columns, rows=rows[:OPEN])]
+    if rows[OPEN:]:
+        summary = f"{len(rows) - OPEN} more values"
+        blocks.append(Details(summary=summary, blocks=[Table(columns=columns, rows=rows[OPEN:])]))
+    return [Section(title="What was changed", blocks=blocks)]
 
 
 def _histories(found: Pair) -> list[Block]:

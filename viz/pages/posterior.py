@@ -11,7 +11,17 @@ from rollover.calibration.posterior import Posterior, summary
 from viz.content.blocks import Block, Cell, Figure, Note, Table
 from viz.figures.corner import corner
 
-COLUMNS = ("parameter", "mean", "deviation", "2.5 %", "median", "97.5 %", "R-hat", "steps worth one", "independent")
+COLUMNS = (
+    "parameter",
+    "mean",
+    "deviation",
+    "2.5 %",
+    "median",
+    "97.5 %",
+    "R-hat",
+    "autocorrelation time, steps",
+    "effective samples",
+)
 NUMBERS = ("mean", "deviation", "low", "median", "high")
 
 
@@ -27,7 +37,7 @@ def open_values(
     axes = [f"{name}, {unit}" if unit else name for name, unit in zip(names, units, strict=True)]
     figure = Figure(
         svg=corner(axes, values, fitted),
-        caption="Draws of the posterior: 68 % and 95 % lie within the shades; lines are the fitted values.",
+        caption="Samples of the posterior: 68 % and 95 % lie within the shades; lines are the fitted values.",
     )
     told, rows = summary(names, values, drawn, prior)["parameters"], list[list[str | Cell]]()
     for name in names:
@@ -36,7 +46,7 @@ def open_values(
         length = f"{one['autocorrelation_time']:.2g}", f"{one['effective_draws']:.0f}"
         rows.append([name, *(f"{one[key]:.5g}" for key in NUMBERS), agree, *length])
     text = (
-        f"{len(values)} draws by {drawn.sampler}: {drawn.walkers} walkers, {drawn.steps} steps after {drawn.warm_up}, "
-        f"{drawn.acceptance:.0%} of the jumps accepted. {prior} The draws are posterior.csv."
+        f"{len(values)} samples by {drawn.sampler}: {drawn.walkers} walkers, {drawn.steps} steps after "
+        f"{drawn.warm_up}, {drawn.acceptance:.0%} of the jumps accepted. {prior} The samples are posterior.csv."
     )
     return [figure, Table(columns=COLUMNS, rows=rows, numeric=range(1, 9)), Note(text=text)]

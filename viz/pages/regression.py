@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rollover.assessment.results import versions
-from rollover.studies.baseline import Answer, Difference, unchanged
+from rollover.studies.baseline import Answer, Difference
+from rollover.studies.regression import unchanged
 from viz.content.blocks import Block, Cell, Details, Footer, Headline, Note, Section, Table, as_sentence
 from viz.pages.page import render
 from viz.pages.report import number, series_unit
@@ -24,7 +25,7 @@ def page(answers: Sequence[Answer], *, command: str, scenario_hash: str = "") ->
         written = "1 baseline was" if len(updated) == 1 else f"{len(updated)} baselines were"
         head = Headline(sentence=f"{written} written.")
     else:
-        head = Headline(sentence=f"{as_sentence(unchanged(len(answers)))}.", state="pass")
+        head = Headline(sentence=f"{as_sentence(unchanged(answers))}.", state="pass")
     rows: list[list[str | Cell]] = [
         [
             a.scenario,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rollover.assessment.bands import Band
 from rollover.assessment.clearance import Approach, approaches
 from rollover.assessment.criteria import Criterion
 from rollover.assessment.criteria import in_words as standards_in_words
@@ -39,11 +40,12 @@ def page(
     *,
     rows: Sequence[Criterion] = (),
     near: Sequence[Approach] | None = None,
+    bands: Sequence[Band] = (),
     command: str = "rollover run scenario.yaml",
 ) -> str:
     """HTML of a run's report. `answer` is its run.json, `rows` what it was held against.
 
-    `near` are its `approaches`, where they have been worked out.
+    `near` are its `approaches`, where they have been worked out; `bands` those of neighbouring starts.
     """
     if near is None:
         near = approaches(run)
@@ -56,7 +58,7 @@ def page(
         *_domain(run, peaks),
         *_standards(run, rows),
     ]
-    blocks += [*_histories(run, peaks), *_structure(run, rows, near), *_ledger(run), *_course(run, answer)]
+    blocks += [*_histories(run, peaks, bands), *_structure(run, rows, near), *_ledger(run), *_course(run, answer)]
     return render(
         title=run.scenario.title,
         subtitle="Rollover load study: one run",
@@ -136,7 +138,16 @@ def _peaks(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
         return []
     within = "inside" if rests_on_ground(run) else "ground not touched"
     ensemble = any(p.scatter is not None for p in shown)
-    columns = ["load", "unit", "raw", "at, s", f"CFC {shown[0].cfc}", "at, s", "impulse, N s", "change at half step"]
+    columns = [
+        "load",
+        "unit",
+        "raw",
+        "at, s",
+        f"CFC {shown[0].cfc}",
+        "at, s",
+        "impulse, N\N{NO-BREAK SPACE}s",
+        "change at half step",
+    ]
     columns += [f"mean of {shown[0].starts}", "scatter"] if ensemble else []
     rows: list[list[str | Cell]] = []
     for p in shown:
@@ -205,7 +216,7 @@ def _domain(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
     return [Section(title="Calibrated domain", blocks=[Note(text=text, warning=True), table])]
 
 
-def _histories(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
+def _histories(run: Run, peaks: Sequence[PeakLoad], bands: Sequence[Band] = ()) -> list[Block]:
     cfc, time = run.scenario.loads.cfc, run.recording.time
     figures: list[Block] = []
     shared: dict[tuple[str, str], list[Curve]] = {}  # by what is drawn and its unit: one axis, one quantity
@@ -220,10 +231,16 @@ def _histories(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
                 role = plots.CYCLE[len(group) % len(plots.CYCLE)]
                 group.append(Curve(name=f"{s.name}, CFC {cfc}", x=time, y=smooth.y, role=role))
             continue
-        both = [_raw(run, parts, s.factor), smooth]
+        both, scatter = [_raw(run, parts, s.factor), smooth], ""
+        for b in (b for b in bands if b.channel == channel):
+            mean, deviation = s.factor * b.mean, s.factor * b.deviation
+            both.append(Curve(name=f"mean of {b.starts}", x=b.time, y=mean, role="third", spread=deviation))
+            scatter = f" Band: standard deviation over {b.starts} neighbouring starts."
         svg = plots.history(both, label=f"{s.name}, {s.unit}", phases=run.phases)
         text = next((f"; peak {raw(p)} raw" for p in peaks if p.channel == channel), "")
-        figures.append(Figure(svg=svg, caption=f"{title(s.name)} over time, raw and CFC {cfc}{text}. Shading: phases."))
+        figures.append(
+            Figure(svg=svg, caption=f"{title(s.name)} over time, raw and CFC {cfc}{text}. Shading: phases.{scatter}")
+        )
     for (name, unit), group in sorted(shared.items()):
         svg = plots.history(group, label=f"{name}, {unit}", phases=run.phases)
         figures.append(Figure(svg=svg, caption=f"{title(name)} over time, CFC {cfc}."))

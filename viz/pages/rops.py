@@ -35,7 +35,7 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
     found = findings(answer["tests"])
     bad = answer["verdict"] == "not met"
     head = Headline(
-        sentence=_answer(answer),
+        sentence=headline(answer),
         detail=f"{answer['elements']} elements, {answer['segments']} to a member; feet: {answer['base']}.",
         state="fail" if bad else "warn" if answer["warnings"] else "pass" if answer["verdict"] == "met" else "",
     )
@@ -63,7 +63,7 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
     )
 
 
-def _answer(answer: Mapping[str, Any]) -> str:
+def headline(answer: Mapping[str, Any]) -> str:
     """How many requirements are met, and how near the frame came to the clearance zone."""
     verdicts = [row["verdict"] for row in answer["criteria"]]
     met, of = verdicts.count("met"), len(verdicts)

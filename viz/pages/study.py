@@ -55,13 +55,14 @@ def page(study: Study, done: Conducted, report: Mapping[str, Any], *, command: s
     return render(
         title=report["title"],
         subtitle="Load study",
-        headline=_headline(report),
+        headline=headline(report),
         blocks=blocks,
         footer=Footer(command=command, scenario_hash=report["scenario_hash"], versions=report["versions"]),
     )
 
 
-def _headline(report: Mapping[str, Any]) -> Headline:
+def headline(report: Mapping[str, Any]) -> Headline:
+    """What the first output comes to: how often it lies beyond its limit or, without one, how far it goes."""
     n, first = report["cases"], report["outputs"][0]
     unit, factor = series_unit(first["unit"])
     failed = f"{n['failed']} of {n['all']} cases failed. " if n["failed"] else f"{n['all']} cases. "
@@ -125,7 +126,7 @@ def _quantiles(output: Mapping[str, Any], *, drawn: bool) -> Table:
     if (e := output["beyond_limit"]) is not None:
         failed = f", {e['failed']} failed" if e["failed"] else ""
         rows.append([f"{e['beyond']} {e['limit'] * factor:.4g}{known}", f"{e['hits']} of {e['cases']}{failed}", "", ""])
-    how = "Intervals by order statistics and Clopper-Pearson." if drawn else "The cases of a plan are no draws."
+    how = "Intervals by order statistics and Clopper-Pearson." if drawn else "The cases of a plan are no random sample."
     missing = f"; {output['missing']} have no such measure" if output["missing"] else ""
     return Table(
         columns=(f"{output['name']}{known and ','}{known}", "", "interval from", "to")[: 4 if drawn else 2],

@@ -1,4 +1,4 @@
-"""A measured curve in the viewer, with a band of 1 sigma of its noise to each side."""
+"""Curves in the viewer with a band of 1 sigma to each side: of the noise of a measured one, of an ensemble."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def broken(time: Array, *columns: Array) -> tuple[Array, ...]:
     return (at, *(np.insert(column, breaks, np.nan) for column in columns))
 
 
-def look(out: Stream, path: str, *, name: str, width: float, unit: str, is_band: bool) -> None:
-    """How a measured curve is drawn, of which the noise is known, or is not."""
-    drawn = {"names": [name], "colors": colour(MEASURED), "widths": [width], "aggregation_policy": POLICY}
-    band = rr.Measurements.from_fields(**drawn, units=[unit]) if is_band else rr.SeriesLines(**drawn)
-    out.static(path, band)
+def look(out: Stream, path: str, *, name: str, width: float, unit: str, is_band: bool, shade: int = MEASURED) -> None:
+    """How a curve is drawn whose band is known, or is not."""
+    drawn = {"names": [name], "colors": colour(shade), "widths": [width], "aggregation_policy": POLICY}
+    line = rr.Measurements.from_fields(**drawn, units=[unit]) if is_band else rr.SeriesLines(**drawn)
+    out.static(path, line)
 
 
 def rows(out: Stream, path: str, time: Array, values: Array, sigma: Array | None) -> None:

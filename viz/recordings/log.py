@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
+from rollover.assessment.bands import Band
 from rollover.assessment.ledger import closure
 from rollover.dynamics.result import Run
 from rollover.spec.document import content_hash, dump
-from viz.content.entities import FILTERED, LIMIT, PHASE, series
+from viz.content.entities import FILTERED, LIMIT, NEIGHBOURS, PHASE, series
 from viz.content.verdict import Peak, filtered, known, ranked, raw, title_of, verdict
+from viz.recordings import band
 from viz.recordings.blueprint import Beside, blueprint
 from viz.recordings.draw import WARNINGS, moving, peak_place, picture, sentence, standing
 from viz.recordings.saved import saving
@@ -40,13 +42,14 @@ def write_rrd(
     path: Path,
     *,
     peaks: Sequence[Peak] = (),
+    bands: Sequence[Band] = (),
     beside: Callable[[Stream], None] | None = None,
     shown: Beside | None = None,
 ) -> None:
     """Write a run as a recording for the viewer, whole or not at all; a failed run is shown as far as it came.
 
-    `peaks` are the peak loads of the report; without them, raw peaks are read off the channels. `beside` writes what
-    stands beside the simulated values, `shown` says how the layout shows it.
+    `peaks` are the peak loads of the report; without them, raw peaks are read off the channels. `bands` are those of
+    neighbouring starts. `beside` writes what stands beside the simulated values, `shown` says how the layout shows it.
     """
     name = run_id(run)
     # one application for each scenario: recordings of one application share a layout, and another vehicle's eye and
@@ -57,12 +60,18 @@ def write_rrd(
         out, found = Stream(rec), ranked(run, peaks)
         standing(out, run, with_)
         _looks(out, run, found)
+        for one in bands:
+            s, name = series(one.channel), f"mean of {one.starts} starts, CFC {one.cfc}"
+            band.look(out, s.neighbours, name=name, width=1.5, unit=s.unit, is_band=True, shade=NEIGHBOURS)
         _documents(out, run, verdict(run, found, with_.scales))
         out.settle()
         moving(out, run, with_)
         for channel, values in run.recording.channels.items():
             s = series(channel)
             out.columns(s.simulated, run.recording.time, rr.Scalars.columns(scalars=values * s.factor))
+        for one in bands:
+            s = series(one.channel)
+            band.rows(out, s.neighbours, one.time, one.mean * s.factor, one.deviation * s.factor)
         _peaks(out, run, found)
         if found and found[0] in _marked(run, found):
             peak_place(out, run, found[0], with_.size)

@@ -56,7 +56,7 @@ def calibrate(
     posterior: Annotated[
         bool, typer.Option("--posterior/--no-posterior", help="Sample what the recordings leave open of the values.")
     ] = False,
-    draws: Annotated[int, typer.Option(help="Draws of the posterior.", min=500, max=1_000_000)] = 3000,
+    draws: Annotated[int, typer.Option(help="Samples of the posterior.", min=500, max=1_000_000)] = 3000,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/calibrate/NAME")] = None,
     workers: Annotated[int, typer.Option(help="Starts followed at once; 0 for this process.", min=0)] = 0,

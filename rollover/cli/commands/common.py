@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 THE_ANSWER_IS_NO, WRONG_INPUT, FAILED, INTERRUPTED, BUG = 1, 2, 3, 130, 70
 MACHINE = 74  # as sysexits.h has it: an error of input or output
-COMPILING = 100  # s; 88 to 108 on idle cores of an AMD EPYC, by `rollover run side_overturn` with an empty cache
 
 C = TypeVar("C", bound=Callable[..., None])
 

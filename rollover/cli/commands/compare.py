@@ -13,7 +13,6 @@ import typer
 
 from rollover.cli.commands.common import (
     BROKE,
-    COMPILING,
     FAILED,
     AsJson,
     Force,
@@ -76,6 +75,7 @@ def compare(
 
     Nothing is shifted in time but a clock in doubt, to the zero that the recording shows.
     """
+    from ground.compiled import is_warm
     from rollover.assessment import results
     from rollover.cli import console
     from rollover.comparison.compared import FORMAT, compared, json_of
@@ -100,8 +100,8 @@ def compare(
     about["origin"] = results.origin(path, folder, set_ or [])
     files = [JSON, PAGE, *pictures.values(), *curves.values()]
     results.claim_report(folder, FORMAT, about, files, force=force, say=console.say)
-    _say_compiling()
-    done = compared(chosen, measured, file=path, cfc=cfc, watch=_watched)
+    with console.compiling(not is_warm()):
+        done = compared(chosen, measured, file=path, cfc=cfc, watch=_watched)
     found, runs = done.misfits, done.runs
     answer = json_of(done, about)
     by = ["--profile", str(profile)] if profile else []
@@ -144,7 +144,6 @@ def _two_runs(
     from rollover.comparison.run_pair import is_result, pair, summary
     from rollover.comparison.run_pair import read as result
     from viz.content.pair_words import answer as in_words
-    from viz.content.pair_words import markdown
     from viz.pages.pair import page
 
     if refused:
@@ -168,8 +167,7 @@ def _two_runs(
     if as_json:
         print(json.dumps(results.plain(answer), indent=2))
     else:
-        console.tell(markdown(found))
-        console.say(f"Results: {folder}")
+        console.pair(found, str(folder))
 
 
 def _draw_pair(found: Pair, path: Path) -> None:
@@ -185,14 +183,6 @@ def _draw_pair(found: Pair, path: Path) -> None:
         if (e.name or "").partition(".")[0] != "rerun":
             raise
         console.say(f"No rerun wheel for this platform: {path.name} was not written.")
-
-
-def _say_compiling() -> None:
-    from ground.compiled import is_warm
-    from rollover.cli import console
-
-    if not is_warm():
-        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
 
 
 @contextmanager

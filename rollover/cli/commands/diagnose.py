@@ -100,7 +100,7 @@ def diagnose(
     posterior: Annotated[
         bool, typer.Option("--posterior/--no-posterior", help="Sample what the recordings leave open of what is named.")
     ] = False,
-    draws: Annotated[int, typer.Option(help="Draws of the posterior.", min=500, max=1_000_000)] = 3000,
+    draws: Annotated[int, typer.Option(help="Samples of the posterior.", min=500, max=1_000_000)] = 3000,
     set_: Setting = None,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
@@ -231,7 +231,7 @@ def diagnose(
             drawn.result()
     executor.close()
     if posterior and found.posterior is None:
-        console.say("--posterior: nothing is named, so that there are no draws")
+        console.say("--posterior: nothing is named, so that there are no samples")
     if as_json:
         print(json.dumps(answer, indent=2))
     else:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import shlex
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,7 +14,10 @@ from rollover.cli.commands.common import AsJson, Force, Setting, answering, app,
 from rollover.system.arguments import MOST_FORCE
 from rollover.system.errors import Fault, InputError
 
-SOIL, ANSWER = "soil.yaml", "identify.json"
+if TYPE_CHECKING:
+    from rollover.calibration.identification import Identification
+
+SOIL, ANSWER, PAGE = "soil.yaml", "identify.json", "report.html"
 
 
 class Form(StrEnum):
@@ -69,6 +73,7 @@ def identify_(
     from rollover.recording.importers import name_of
     from rollover.spec import document
     from rollover.system.writing import hold
+    from viz.pages.identification import headline
 
     chosen = scenarios.load(document.find(scenario))
     if set_:
@@ -89,12 +94,13 @@ def identify_(
         keep=keep,
     )
     report = identification.json_of(answer)
-    _write(folder, answer.soil, report)
+    _write(folder, answer, report, shlex.join(["rollover", "identify", *recordings]))
     for reason in answer.refused:
         console.say(f"left out: {reason}")
     if as_json:
         print(json.dumps(report, indent=2))
         return
+    console.tell(f"{headline(report)}.")
     widths = [max(map(len, column)) for column in zip(*answer.table, strict=True)]
     for row in answer.table:
         console.tell("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
@@ -109,7 +115,7 @@ def _claim(folder: Path, force: bool) -> None:
     from rollover.system.writing import own
 
     there = [p.name for p in folder.iterdir() if not own(folder.resolve(), p.name)] if folder.is_dir() else []
-    foreign = [name for name in there if name not in (SOIL, ANSWER)] if folder.is_dir() else [folder.name]
+    foreign = [name for name in there if name not in (SOIL, ANSWER, PAGE)] if folder.is_dir() else [folder.name]
     if foreign:
         raise InputError(
             Fault(file=str(folder), message=f"holds files that are not results, got {foreign[0]!r}; another --out")
@@ -120,10 +126,21 @@ def _claim(folder: Path, force: bool) -> None:
         )
 
 
-def _write(folder: Path, soil: str, report: dict[str, object]) -> None:
-    """Both files, or none."""
+def _write(folder: Path, answer: Identification, report: dict[str, Any], command: str) -> None:
+    """All files, or none."""
+    from rollover.assessment.results import versions
     from rollover.system.writing import whole
+    from viz.pages.identification import page
 
+    text = page(
+        answer.law,
+        report,
+        refused=answer.refused,
+        remarks=answer.remarks,
+        command=command,
+        versions=versions(),
+    )
     with whole(folder) as part:
-        (part / SOIL).write_text(soil, encoding="utf-8")
+        (part / SOIL).write_text(answer.soil, encoding="utf-8")
         (part / ANSWER).write_text(json.dumps(report, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        (part / PAGE).write_text(text, encoding="utf-8")

@@ -14,7 +14,6 @@ import typer
 
 from rollover.cli.commands.common import (
     BROKE,
-    COMPILING,
     FAILED,
     NO,
     THE_ANSWER_IS_NO,
@@ -80,11 +79,9 @@ def regress(
     results.claim_report(
         out, FORMAT, {"scenarios": selection}, ACCOUNT, force=force, own_report=overlaps, say=console.say
     )
-    if not is_warm():
-        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     failed: list[Answer] = []
     new: dict[Path, Baseline] = {}
-    with console.counting("runs") as show:
+    with console.compiling(not is_warm()), console.counting("runs") as show:
         if update:
             try:
                 answers = regression.updated(

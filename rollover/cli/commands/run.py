@@ -6,7 +6,7 @@ import json
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +14,6 @@ import typer
 
 from rollover.cli.commands.common import (
     BROKE,
-    COMPILING,
     FAILED,
     NO,
     THE_ANSWER_IS_NO,
@@ -30,8 +29,6 @@ from rollover.cli.commands.common import (
 if TYPE_CHECKING:
     from rollover.assessment.assessed import AssessedRun, Progress
     from rollover.assessment.criteria import Criterion
-    from rollover.assessment.loads import PeakLoad
-    from rollover.dynamics.result import Run
     from rollover.scenario import Scenario
 
 
@@ -73,8 +70,6 @@ def run(
 
     path, chosen = scenario_with(scenario, set_)
     compiles = not is_warm(chosen.integrator)
-    if compiles:
-        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     from rollover.assessment import results
     from rollover.assessment.assessed import assessed
 
@@ -82,11 +77,11 @@ def run(
     made_from = results.origin(path, folder, set_ or [])
     # before a run that may take minutes
     results.claim(folder, document.content_hash(chosen), force=force, made_from=made_from, say=console.say)
-    with document.named(path):
+    with console.compiling(compiles), document.named(path):
         found = assessed(chosen, half_step=half_step, watch=_watched)
     done, again, rows = found.result, found.half_step, found.criteria
     if found.peaks and ensemble > 1:
-        found = replace(found, peaks=_with_scatter(found.peaks, chosen, ensemble))
+        found = _with_scatter(found, ensemble)
     peaks = found.peaks
     command = " ".join(["rollover", "run", scenario, *(f"--set {shlex.quote(s)}" for s in set_ or [])])
     answer = results.write(
@@ -95,7 +90,7 @@ def run(
         peaks,
         criteria=[asdict(row) for row in rows],
         half_step=again,
-        picture=_picture(done, peaks),
+        picture=_picture(found),
         page=lambda answer: _page(found, answer, command),
         force=force,
         made_from=made_from,
@@ -103,7 +98,7 @@ def run(
     if as_json:
         print(json.dumps(answer, indent=2))
     else:
-        console.report(done, peaks, rows, answer, str(folder), compiled=compiles)
+        console.report(done, peaks, rows, answer, str(folder), headline=_headline(found), compiled=compiles)
     if done.status == "failed":
         console.say(f"{path}: the simulation failed: {done.sentence}")
         raise typer.Exit(FAILED)
@@ -137,24 +132,38 @@ def _watched(what: str, scenario: Scenario) -> Iterator[Progress]:
         yield show
 
 
-def _with_scatter(peaks: Sequence[PeakLoad], scenario: Scenario, starts: int) -> tuple[PeakLoad, ...]:
+def _with_scatter(found: AssessedRun, starts: int) -> AssessedRun:
     from rollover.cli import console
     from rollover.studies.ensemble import FailedRunError, with_scatter
 
     try:
-        return with_scatter(peaks, scenario, starts)
+        return with_scatter(found, starts)
     except FailedRunError as e:
         console.say(f"No scatter: {e}")
-        return tuple(peaks)
+        return found
+
+
+def _headline(found: AssessedRun) -> str:
+    from viz.pages import report
+
+    return report.headline(found.result, found.peaks, found.criteria, found.approaches).sentence
 
 
 def _page(found: AssessedRun, answer: Mapping[str, Any], command: str) -> str:
     from viz.pages import report
 
-    return report.page(found.result, found.peaks, answer, rows=found.criteria, near=found.approaches, command=command)
+    return report.page(
+        found.result,
+        found.peaks,
+        answer,
+        rows=found.criteria,
+        near=found.approaches,
+        bands=found.bands,
+        command=command,
+    )
 
 
-def _picture(done: Run, peaks: Sequence[PeakLoad]) -> Callable[[Path], None] | None:
+def _picture(found: AssessedRun) -> Callable[[Path], None] | None:
     from rollover.cli import console
 
     try:
@@ -164,4 +173,4 @@ def _picture(done: Run, peaks: Sequence[PeakLoad]) -> Callable[[Path], None] | N
             raise
         console.say("No rerun wheel for this platform: recording.rrd was not written.")
         return None
-    return lambda path: log.write_rrd(done, path, peaks=peaks)
+    return lambda path: log.write_rrd(found.result, path, peaks=found.peaks, bands=found.bands)

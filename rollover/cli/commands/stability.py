@@ -10,7 +10,6 @@ import typer
 
 from rollover.cli.commands.common import (
     BROKE,
-    COMPILING,
     FAILED,
     AsJson,
     Force,
@@ -53,10 +52,8 @@ def stability_(
     about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), **chosen.own_code}
     about["origin"] = results.origin(file_of(name), folder, set_ or [])
     results.claim_report(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
-    if not is_warm():
-        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     try:
-        with console.counting("headings") as show:
+        with console.compiling(not is_warm()), console.counting("headings") as show:
             found = found_for(chosen, headings, show)
     except ArithmeticError as e:
         console.say(f"{name}: {e}")

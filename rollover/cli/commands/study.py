@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.cli.commands.common import (
-    COMPILING,
     FAILED,
     AsJson,
     Force,
@@ -81,8 +80,7 @@ def study(
         memory_limit=1e6 * memory_limit,
         retry="failed" if retry else "",
     )
-    if not is_warm(chosen.scenario.of_many().integrator) and chosen.simulator == "full":
-        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
+    cold = chosen.simulator == "full" and not is_warm(chosen.scenario.of_many().integrator)
     words = ["rollover", "study", name, *(w for s in set_ or [] for w in ("--set", s))]
     command = " ".join(map(shlex.quote, [*words, *(["--out", str(out)] if out else [])]))
 
@@ -91,11 +89,14 @@ def study(
 
         return page(chosen, done, report, command=command)
 
-    report = ready.carried_out(way, page=drawn, watch=console.counting, say=console.say)
+    with console.compiling(cold):
+        report = ready.carried_out(way, page=drawn, watch=console.counting, say=console.say)
     if as_json:
         print(json.dumps(results.plain(report), indent=2))
     else:
-        console.tell("\n".join([*sentences(report), f"Results: {ready.folder}"]))
+        from viz.pages.study import headline
+
+        console.tell("\n".join([headline(report).sentence, *sentences(report), f"Results: {ready.folder}"]))
     if not report["cases"]["done"]:
         console.say(f"{path}: every case failed; the first: {report['failures'][0]['sentence']}")
         raise typer.Exit(FAILED)

@@ -102,7 +102,7 @@ def _page(path: Path, html: Path, force: bool) -> None:
         if e.errno is not None:  # the machine's, no answer of the viewer
             raise
         raise InputError(Fault(file=str(html), message=str(e))) from None
-    console.say(f"Written: {html}, {html.stat().st_size / 1e6:.0f} MB. A double click opens it.")
+    console.tell(f"Written: {html}, {html.stat().st_size / 1e6:.0f} MB. A double click opens it.")
 
 
 def _about(path: Path) -> tuple[str, str]:

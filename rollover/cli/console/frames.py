@@ -12,11 +12,18 @@ from rollover.system.errors import excerpt
 def rops(answer: Mapping[str, Any], folder: str) -> None:
     """Loads, hinges in their order and verdicts of a frame alone."""
     from rollover.assessment.stand_results import findings
+    from viz.pages.rops import headline
 
     out = terminal.out()
     out.print(
         f"{excerpt(answer['vehicle'])}, {answer['mass']:g} kg; frame of {answer['frame_mass']:.1f} kg", style="bold"
     )
+    out.print(headline(answer), style="bold")
+    for c in answer["criteria"]:
+        style = {"met": "green", "not met": "bold red"}.get(c["verdict"], "yellow")
+        out.print(
+            f"{c['requirement']['standard']}, {c['requirement']['name']}: {c['verdict']} ({c['note']})", style=style
+        )
     out.print(f"{answer['elements']} elements, {answer['segments']} to a member; feet: {answer['base']}.")
     found = findings(answer["tests"])
     if found is not None:
@@ -29,11 +36,6 @@ def rops(answer: Mapping[str, Any], folder: str) -> None:
             )
         if e.get("mechanism_force") is not None:
             out.print(f"{e['name']}: mechanism at {1e-3 * e['mechanism_force']:.1f} kN")
-    for c in answer["criteria"]:
-        style = {"met": "green", "not met": "bold red"}.get(c["verdict"], "yellow")
-        out.print(
-            f"{c['requirement']['standard']}, {c['requirement']['name']}: {c['verdict']} ({c['note']})", style=style
-        )
     for said in answer["warnings"]:
         out.print(said, style="yellow")
     out.print(f"Results: {folder}")

@@ -17,9 +17,12 @@ MOST = 20  # columns of a matrix that a terminal holds; beyond that the pairs th
 
 def plan(found: Plan, folder: str) -> None:
     """What a test would show."""
+    from viz.pages.plan import headline
+
     out = terminal.out()
+    out.print(headline(found).sentence, style="bold")
     asked = f"{found.power:.0%} at {found.false_alarm:.0%} false alarms of all effects together"
-    out.print(f"Detectable with {asked}:", style="bold")
+    out.print(f"Detectable with {asked}:")
     table = Table(box=None, pad_edge=False)
     for heading in ("", "effect", "parameter", "from", "unit", "usually", "seen then with"):
         table.add_column(heading, justify="right" if heading in ("", "from", "usually", "seen then with") else "left")

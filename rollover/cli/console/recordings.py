@@ -20,9 +20,13 @@ if TYPE_CHECKING:
 def comparison(found: Sequence[Misfit], folder: str) -> None:
     """How well each recording is followed, a line for each channel."""
     from rollover.comparison.rating import Iso18571, NotRateable, verdict
+    from viz.pages.comparison import headline
 
     styles = {"good": "", "fair": "yellow", "poor": "bold red"}
     out = terminal.out()
+    told = headline(found)
+    out.print(told.sentence, style="bold")
+    out.print(told.detail)
     for each in found:
         out.print(each.recording, style="bold")
         table = Table(box=None, pad_edge=False)
@@ -74,7 +78,10 @@ def comparison(found: Sequence[Misfit], folder: str) -> None:
 
 def calibration(found: Calibration, folder: str) -> None:
     """Fitted values with their intervals, and what they gain."""
+    from viz.pages.calibration import headline
+
     out = terminal.out()
+    out.print(headline(found).sentence, style="bold")
     table = Table(box=None, pad_edge=False)
     for heading in ("parameter", "unit", "was", "is", "95 % from", "to", "", ""):
         table.add_column(heading, justify="right" if heading in ("was", "is", "95 % from", "to") else "left")
@@ -100,8 +107,8 @@ def calibration(found: Calibration, folder: str) -> None:
     if (drawn := found.posterior) is not None:
         worst, least = float(drawn.r_hat.max()), float(drawn.effective.min())
         out.print(
-            f"posterior: {len(drawn.draws)} draws by {drawn.sampler}, R-hat up to {worst:.3f}, autocorrelation time up "
-            f"to {float(drawn.autocorrelation.max()):.2g} steps, {least:.0f} independent draws at least"
+            f"posterior: {len(drawn.draws)} samples by {drawn.sampler}, R-hat up to {worst:.3f}, autocorrelation time "
+            f"up to {float(drawn.autocorrelation.max()):.2g} steps, {least:.0f} independent samples at least"
         )
     for warning in found.warnings:
         out.print(warning, style="yellow")
@@ -152,6 +159,11 @@ def stability(answer: Mapping[str, Any], folder: str) -> None:
     """Static stability angles, a line for each heading, with the closed forms for stiff tyres beside."""
     out = terminal.out()
     out.print(excerpt(answer["vehicle"]), style="bold")
+    least, limit = answer["least"], answer["code_6"]
+    verdict = "below" if least["balance_deg"] < limit["limit_deg"] else "not below"
+    angle, heading = f"{least['balance_deg']:.2f} deg", f"heading {least['heading_deg']:g}"
+    asked = f"{limit['limit_deg']:g} deg asked of narrow tractors ({limit['confidence']})"
+    out.print(f"Least static stability angle {angle}, at {heading}: {verdict} the {asked}.", style="bold")
     table = Table(box=None, pad_edge=False)
     for heading in ("heading", "lift-off", "pivot ends", "on stop", "overturns", "stiff: pivot", "stiff: stop"):
         table.add_column(heading, justify="right")
@@ -169,13 +181,6 @@ def stability(answer: Mapping[str, Any], folder: str) -> None:
         share, was, now = 100.0 * part["share"], part["without_deg"], part["with_deg"]
         out.print(f"{part['part']}: takes {share:.1f} % across the slope, {was:.2f} -> {now:.2f} deg")
     _left_out(answer)
-    least, limit = answer["least"], answer["code_6"]
-    verdict = "below" if least["balance_deg"] < limit["limit_deg"] else "not below"
-    out.print(
-        f"Least {least['balance_deg']:.2f} deg at heading {least['heading_deg']:g}: {verdict} the "
-        f"{limit['limit_deg']:g} deg asked of narrow tractors ({limit['confidence']}).",
-        style="bold",
-    )
     out.print(f"Results: {folder}")
 
 
@@ -188,6 +193,9 @@ def rolling(answer: Mapping[str, Any], folder: str) -> None:
     """Verdict of the planar calculation of rolling, beside every number on the way."""
     out = terminal.out()
     out.print(excerpt(answer["vehicle"]), style="bold")
+    out.print(
+        f"{answer['verdict'].capitalize()} rolling (version {answer['version']}): {answer['sentence']}.", style="bold"
+    )
     table = Table(box=None, pad_edge=False)
     table.add_column("step")
     table.add_column("what")
@@ -200,8 +208,5 @@ def rolling(answer: Mapping[str, Any], folder: str) -> None:
     for said in answer["outside"]:
         out.print(said, style="yellow")
     _left_out(answer)
-    out.print(
-        f"{answer['verdict'].capitalize()} rolling (version {answer['version']}): {answer['sentence']}.", style="bold"
-    )
     out.print(f"{answer['source']}.")
     out.print(f"Results: {folder}")

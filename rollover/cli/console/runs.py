@@ -26,9 +26,10 @@ def report(
     answer: Mapping[str, Any],
     folder: str,
     *,
+    headline: str,
     compiled: bool = False,
 ) -> None:
-    """The answer of a run on standard output; what took part of its time to compile tells no speed."""
+    """The answer of a run, its `headline` first; what took part of its time to compile tells no speed."""
     from rollover.assessment.criteria import in_words
     from rollover.assessment.ledger import closure
     from rollover.assessment.shipped import origin
@@ -36,6 +37,8 @@ def report(
 
     out = terminal.out()
     out.print(excerpt(run.scenario.title), style="bold")
+    if run.status == "done":
+        _answer(out, headline, rows)
     if (made_from := origin(run.scenario)) and made_from.differences:
         out.print(f"{made_from.in_words}.", style="yellow")
     if run.status == "done":
@@ -74,6 +77,12 @@ def report(
     if half is not None and half["status"] != "done":
         out.print(f"At half the step the run failed: {half['sentence']}", style="yellow")
     out.print(f"Results: {folder}")
+
+
+def _answer(out: Console, headline: str, rows: Sequence[Criterion]) -> None:
+    out.print(headline, style="bold")
+    if missed := [row.requirement.name for row in rows if row.verdict == "not met"]:
+        out.print(f"Not met: {', '.join(missed)}.", style="bold red")
 
 
 def _convergence(out: Console, peaks: Sequence[PeakLoad]) -> None:
@@ -137,9 +146,18 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
 
 def regression(answers: Sequence[Answer], folder: str) -> None:
     """What changed, and one line for each scenario, on standard output."""
-    from rollover.studies.baseline import unchanged
+    from rollover.studies.regression import unchanged, without_baseline
 
     out = terminal.out()
+    bad = sum(not a.ok for a in answers)
+    updated = sum(a.verdict == "updated" for a in answers)
+    written = "1 baseline written" if updated == 1 else f"{updated} baselines written"
+    verdict = written if updated else f"{bad} of {len(answers)} scenarios are not as they were"
+    if not bad and not updated:
+        verdict = unchanged(answers)
+    elif aside := without_baseline(answers):
+        verdict = f"{verdict}; {aside}"
+    out.print(f"{verdict[0].upper()}{verdict[1:]}.", style="bold", soft_wrap=True)
     table = Table(box=None, pad_edge=False)
     for heading in ("scenario", "", "runs", "wall s"):
         table.add_column(heading, justify="right" if heading in ("runs", "wall s") else "left")
@@ -166,10 +184,4 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
     for a in answers:
         for note in a.notes:
             out.print(f"{a.scenario}: {note}", style="yellow", soft_wrap=True)  # a command is copied as it stands
-    bad = sum(not a.ok for a in answers)
-    updated = sum(a.verdict == "updated" for a in answers)
-    written = "1 baseline written" if updated == 1 else f"{updated} baselines written"
-    verdict = written if updated else f"{bad} of {len(answers)} scenarios are not as they were"
-    if not bad and not updated:
-        verdict = unchanged(len(answers))
-    out.print(f"{verdict[0].upper()}{verdict[1:]}. Everything: {folder}", style="bold")
+    out.print(f"Everything: {folder}")
