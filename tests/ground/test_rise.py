@@ -57,7 +57,7 @@ def test_rows_above_the_layer_give_the_law_of_the_soil_there() -> None:
     assert found.law.domain.sinkage_most < 0.046
 
 
-def test_what_ends_above_the_layer_is_identified_the_rest_left_out(tmp_path: Path) -> None:
+def test_drops_that_end_above_the_layer_are_taken(tmp_path: Path) -> None:
     names = []
     for speed in (1.0, 1.3, 1.6):
         path = tmp_path / f"d{speed}.csv"
@@ -81,7 +81,7 @@ def test_branches_of_layered_drops_are_finite_or_unknown() -> None:
         assert np.all(np.isfinite(found.x))
 
 
-def test_drops_that_stay_in_the_first_branch_are_refused_with_a_cure() -> None:
+def test_drops_within_the_first_branch_are_refused_with_a_cure() -> None:
     # K_b1 = 75 kN/m on 132 kg: v/omega is 8 mm at 0.2 m/s, and the branches meet at 33 mm
     with pytest.raises(UnusableDrop, match=r"0.2 m/s, 0.3 m/s: not of this law, sinkage_exponent: .*; faster drops"):
         identify(recorded(0, speeds=(0.2, 0.3)))
