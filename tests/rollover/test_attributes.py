@@ -180,6 +180,23 @@ def test_steps_and_rates_in_the_unit_beside_them(tmp_path: Path, attributes: dic
     assert named(tmp_path / "a.h5", {"F": f"{FORCE}, unit: N"}).time == pytest.approx(step * np.arange(6))
 
 
+@pytest.mark.parametrize("key", ["decimation", "Downsampling_Factor", "subsample"])
+def test_samples_left_out_beside_a_groups_rate_are_refused(tmp_path: Path, key: str) -> None:
+    """One in four of the group's samples: at its rate they would last a quarter of the time."""
+
+    def held(own: dict[str, Any]) -> Recording:
+        with h5py.File(tmp_path / "a.h5", "w") as file:
+            file["run/F"] = RAW.astype("f8")
+            file["run"].attrs["sample_rate"] = 1000.0
+            file["run/F"].attrs.update({"units": "N", **own})
+        return named(tmp_path / "a.h5", {"run/F": FORCE})
+
+    with pytest.raises(InputError, match=rf"{key.lower()} 4 beside a step of time that is its group's"):
+        held({key: 4})
+    assert held({key: 1}).time[1] == pytest.approx(1e-3)
+    assert held({key: 4, "sample_rate": 250.0}).time[1] == pytest.approx(4e-3)
+
+
 def test_a_step_in_no_unit_of_time_is_refused(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["F"] = RAW * 1.0
