@@ -14,12 +14,16 @@ from ground.drops import Loading, correlated
 from ground.law import REFERENCE_AREA
 
 Array = NDArray[np.float64]
+_FAR = 80.0  # of ln K_b1 and ln F_r: e^80 times the other's depth is still a number
 _MOST_ROWS = 600  # of one drop in the fit; more are averaged in blocks
 
 
 @dataclass(frozen=True, kw_only=True)
 class Branches:
-    """K_b1 and F_r of each drop and the common exponent, per reference area; x = [K_b1.., ln F_r.., n]."""
+    """K_b1 and F_r of each drop and the common exponent, per reference area; x = [K_b1.., ln F_r.., n].
+
+    What `known` denies is no number of the drops, whatever stands in `x`.
+    """
 
     loads: tuple[Loading, ...]
     reference_depth: float  # z_r, m
@@ -39,7 +43,8 @@ class Branches:
         """Sinkage at which each drop changes branch, m."""
         d, n = len(self.loads), self.x[-1]
         strength = np.exp(self.x[d : 2 * d]) * self.reference_depth ** -(1.0 + n)
-        return np.asarray((strength / self.first) ** (-1.0 / n))
+        with np.errstate(all="ignore"):  # of what no row bounds
+            return np.asarray((strength / self.first) ** (-1.0 / n))
 
 
 def _exp(power: float) -> float:
@@ -53,7 +58,7 @@ def fit_branches(loads: Sequence[Loading]) -> Branches:
     """K_b1 and the second branch of every drop, the exponent shared."""
     d = len(loads)
     rows = [_thinned(load) for load in loads]
-    z_r = 0.5 * float(np.median([load.deepest for load in loads]))
+    z_r = 0.5 * float(np.median([load.depth.max() for load in loads]))
     root = [np.linalg.cholesky(load.covariance + 1e-18 * np.eye(len(load.covariance))) for load in loads]
     k = loads[0].shapes.shape[1]
     noise = np.array(
@@ -114,7 +119,7 @@ def fit_branches(loads: Sequence[Loading]) -> Branches:
     inside = inverse(information[np.ix_(kept, kept)])[: known.sum(), : known.sum()]
     covariance[np.ix_(known, known)] = inside
     known = known & (np.diag(covariance) < 1.0)
-    x = done.x[: 2 * d + 1].copy()
+    x = np.clip(done.x[: 2 * d + 1], -_FAR, _FAR)  # what no row bounds may have run away
     turn = np.ones(2 * d + 1)
     x[:d] = np.exp(x[:d])
     turn[:d] = x[:d]

@@ -45,6 +45,7 @@ class Drop:
     buoyancy: float = 0.0  # N
     drag: float = 0.0  # N s2/m2, of the medium above the ground
     zero_error: float = 0.0  # s, 1 sigma of time zero
+    to_depth: float = np.inf  # m, below which its rows are of another soil
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +111,8 @@ def loading(drop: Drop, fraction: float) -> Loading:
     soft = F - fraction * drop.mass * (a + amounts[2])
     below = np.arange(t.size) <= last
     below &= z > 0.0
+    noise = _noise(soft[below])  # of few rows it would be too small
+    below &= np.logical_and.accumulate(z <= drop.to_depth)
     if below.sum() < LEAST_ROWS:
         raise UnusableDrop(
             f"{drop.name}: too few rows below the surface, got {int(below.sum())}; at least {LEAST_ROWS}"
@@ -120,7 +123,7 @@ def loading(drop: Drop, fraction: float) -> Loading:
         depth=z[below],
         rate=v[below],
         force=soft[below],
-        noise=_noise(soft[below]),
+        noise=noise,
         shapes=shapes[below],
         covariance=covariance,
         deepest=float(z[: last + 1].max()),
@@ -128,6 +131,20 @@ def loading(drop: Drop, fraction: float) -> Loading:
         rest_force=float(np.mean(F[rest])) if rest is not None else float("nan"),
         assumed=assumed,
     )
+
+
+def stiffness(load: Loading, points: int = 60) -> tuple[Array, Array, Array]:
+    """K' = (F_s - m_b1 a)/z, eq (3), of one drop with its face: depth, K' and its standard deviation, in bins."""
+    edges = np.linspace(0.0, float(load.depth.max()), points + 1)
+    which = np.clip(np.digitize(load.depth, edges) - 1, 0, points - 1)
+    used = [np.flatnonzero(which == k) for k in range(points)]
+    used = [rows for rows in used if rows.size]
+    z = np.array([load.depth[rows].mean() for rows in used])
+    force = np.array([load.force[rows].mean() for rows in used])
+    off = np.array([load.shapes[rows].mean(axis=0) for rows in used])
+    sd_depth = np.sqrt(np.einsum("ni,ij,nj->n", off, load.covariance, off))
+    noise = load.noise / np.sqrt([rows.size for rows in used])
+    return z, force / z, np.hypot(noise / z, force / z**2 * sd_depth)
 
 
 def rest_stiffness(load: Loading) -> float:

@@ -28,9 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.branches import Branches, fit_branches
-from ground.drops import Drop, Loading, loading, rest_stiffness
+from ground.drops import Drop, UnusableDrop, loading, rest_stiffness, stiffness
 from ground.law import REFERENCE_AREA, REFERENCE_MASS, Calibration, Interval
 from ground.regression import Coefficient, Regression
+from ground.rise import check_one_soil
 from ground.ye import Ye2006
 
 Array = NDArray[np.float64]
@@ -69,25 +70,13 @@ def identify(
         if drop.cone_height > 0.0:
             raise ValueError(f"{drop.name}: a cone, whose area grows; see ground.penetration")
     loads = [loading(drop, fraction) for drop in drops]
+    for load in loads:
+        check_one_soil(load)
     branches = fit_branches(loads)
     masses = np.array([_law_mass(drop, law_mass) for drop in drops])
     table = Regression(branches, masses)
     found, covariance = table.coefficients(keep)
     return _concluded(branches, table, found, covariance, fraction, law_mass, source, tuple(recordings))
-
-
-def stiffness(load: Loading, points: int = 60) -> tuple[Array, Array, Array]:
-    """K' = (F_s - m_b1 a)/z, eq (3), of one drop with its face: depth, K' and its standard deviation, in bins."""
-    edges = np.linspace(0.0, load.deepest, points + 1)
-    which = np.clip(np.digitize(load.depth, edges) - 1, 0, points - 1)
-    used = [np.flatnonzero(which == k) for k in range(points)]
-    used = [rows for rows in used if rows.size]
-    z = np.array([load.depth[rows].mean() for rows in used])
-    force = np.array([load.force[rows].mean() for rows in used])
-    off = np.array([load.shapes[rows].mean(axis=0) for rows in used])
-    sd_depth = np.sqrt(np.einsum("ni,ij,nj->n", off, load.covariance, off))
-    noise = load.noise / np.sqrt([rows.size for rows in used])
-    return z, force / z, np.hypot(noise / z, force / z**2 * sd_depth)
 
 
 def _law_mass(drop: Drop, law_mass: LawMass) -> float:
@@ -129,13 +118,19 @@ def _concluded(
         speed_most=float(table.speeds.max()),
         momentum_most=float((table.masses * table.speeds).max()),
         area=_one([drop.area for drop in groups]),
-        sinkage_most=max(load.deepest for load in branches.loads),
+        sinkage_most=max(float(load.depth.max()) for load in branches.loads),
         log_scatter=scatter,
         multiple_correlation=correlation,
         intervals=tuple(Interval(of=c.name, low=c.low, high=c.high, origin=c.origin) for c in found),
     )
+    try:
+        law = Ye2006(calibration=calibration, **value)
+    except ValueError as reason:
+        names = ", ".join(load.drop.name for load in branches.loads)
+        message = f"{names}: not of this law, {reason}; faster drops, that show both branches, or the law bearing"
+        raise UnusableDrop(message) from None
     return Identified(
-        law=Ye2006(calibration=calibration, **value),
+        law=law,
         coefficients=found,
         covariance=covariance,
         branches=branches,

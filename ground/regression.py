@@ -26,6 +26,10 @@ NAMES = (
     "momentum_base",
 )
 _C, _P, _K0, _K, _N, _B = range(6)
+_LACKING = (
+    ("first", "from a rate that shows how force grows from first contact on"),
+    ("second", "from a faster drop, that goes deeper"),
+)
 _EXPONENTS = np.linspace(0.5, 60.0, 120)  # p that are tried
 
 
@@ -60,8 +64,10 @@ class Regression:
         self.fixed[2 * d, 3] = 1.0
         self.first, self.second = branches.known[:d], branches.known[d : 2 * d]
         if not self.first.any() or not self.second.any():
-            which = "first" if not self.first.any() else "second"
-            raise UnusableDrop(f"{branches.loads[0].drop.name}: no drop shows the {which} branch; both are needed")
+            which, more = _LACKING[int(self.first.any())]
+            raise UnusableDrop(
+                f"{branches.loads[0].drop.name}: no drop shows the {which} branch; both are needed, {more}"
+            )
         self.between = 0.0
         self.covariance = branches.covariance
         self.weights = self._weights(0.0)

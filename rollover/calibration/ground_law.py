@@ -9,10 +9,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ground.drops import Drop, UnusableDrop, found_contact, rest_stiffness, with_terminal_drag
+from ground.drops import Drop, UnusableDrop, found_contact, loading, rest_stiffness, with_terminal_drag
 from ground.identify import Identified, LawMass, identify, stiffness
 from ground.law import GroundLaw
 from ground.penetration import Fitted, chosen, fit_forms, law
+from ground.rise import check_one_soil
 from rollover.comparison.onset import UnknownOnsetError, timed
 from rollover.recording import Recording
 from rollover.recording.time_stamps import Zero, from_first
@@ -68,10 +69,17 @@ def settled(recordings: Mapping[str, Recording], scenario: Scenario) -> Settled:
 
 
 def drop_of(
-    name: str, recording: Recording, scenario: Scenario, *, buoyancy: float = 0.0, terminal: bool = False
+    name: str,
+    recording: Recording,
+    scenario: Scenario,
+    *,
+    buoyancy: float = 0.0,
+    terminal: bool = False,
+    to_depth: float | None = None,
 ) -> Drop:
     """A recording as a drop of the scenario's striker, with what its own conditions replace. Raises `InputError`.
 
+    Rows below `to_depth` (m) are of another soil.
     A recording without `initiation.speed` is one whose clock and speed are found from its deceleration.
     """
     stated = {path: value for path, value in recording.conditions.items() if path != "initiation.speed"}
@@ -98,6 +106,7 @@ def drop_of(
         gravity=scenario.gravity,
         buoyancy=buoyancy,
         zero_error=recording.clock.within or 0.0,
+        to_depth=math.inf if to_depth is None else to_depth,
     )
     if speed is None:
         drop = found_contact(drop)
@@ -105,18 +114,41 @@ def drop_of(
 
 
 def drops_of(
-    recordings: Mapping[str, Recording], scenario: Scenario, *, buoyancy: float = 0.0, terminal: bool = False
+    recordings: Mapping[str, Recording],
+    scenario: Scenario,
+    *,
+    buoyancy: float = 0.0,
+    terminal: bool = False,
+    to_depth: float | None = None,
 ) -> tuple[list[Drop], list[str]]:
     """The usable drops and a sentence for each that is not. Raises `InputError` if none is left."""
     drops, refused = [], []
     for name, recording in recordings.items():
         try:
-            drops.append(drop_of(name, recording, scenario, buoyancy=buoyancy, terminal=terminal))
+            drops.append(drop_of(name, recording, scenario, buoyancy=buoyancy, terminal=terminal, to_depth=to_depth))
         except UnusableDrop as reason:
             refused.append(str(reason))
     if not drops:
         raise InputError(*(Fault(message=reason) for reason in refused))
     return drops, refused
+
+
+def of_one_soil(drops: Sequence[Drop], fraction: float) -> tuple[list[Drop], list[str]]:
+    """The drops in which the law's K' falls all the way down, and a sentence for each that reaches a harder layer.
+
+    Raises `InputError` if none is left.
+    """
+    kept, refused = [], []
+    for drop in drops:
+        try:
+            check_one_soil(loading(drop, fraction))
+        except UnusableDrop as reason:
+            refused.append(str(reason))
+        else:
+            kept.append(drop)
+    if not kept:
+        raise InputError(*(Fault(message=reason) for reason in refused))
+    return kept, refused
 
 
 def zeros_of(drops: Sequence[Drop], recordings: Mapping[str, Recording]) -> dict[str, Zero]:
@@ -158,8 +190,9 @@ def identified(
 def _branches(found: Identified, source: str, marks: Sequence[str]) -> Found:
     branches = found.branches
     drops = []
-    for load, first, change in zip(branches.loads, branches.first, branches.change, strict=True):
+    for j, load in enumerate(branches.loads):
         z, K, sd = stiffness(load)
+        shown, both = branches.known[j], branches.known[[j, len(branches.loads) + j]].all()
         drops.append(
             {
                 "name": load.drop.name,
@@ -168,8 +201,8 @@ def _branches(found: Identified, source: str, marks: Sequence[str]) -> Found:
                 "area": load.drop.area,
                 "deepest": load.deepest,
                 "time_of_deepest": load.duration,
-                "first_stiffness": float(first),
-                "branch_change": float(change),
+                "first_stiffness": float(branches.first[j]) if shown else None,
+                "branch_change": float(branches.change[j]) if both else None,
                 "rest_stiffness": rest_stiffness(load),
                 "assumed": list(load.assumed),
                 "noise": load.noise,

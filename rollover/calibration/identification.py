@@ -16,7 +16,8 @@ from rollover.recording.time_stamps import Zero
 from rollover.scenario import Scenario, given
 from rollover.spec.document import dump
 from rollover.spec.vehicle import Striker
-from rollover.system.arguments import MOST_FORCE, one_of, within
+from rollover.system.arguments import LEAST_DEPTH, MOST_DEPTH, MOST_FORCE, one_of, within
+from rollover.system.errors import Fault, InputError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +47,7 @@ def identify(
     buoyancy: float = 0.0,
     terminal_speed: bool = False,
     keep: bool = False,
+    to_depth: float | None = None,
     profile: str | Path | None = None,
 ) -> Identification:
     """Identify a ground law from recorded drops: stiffness over depth, coefficients with intervals, a soil file.
@@ -68,6 +70,8 @@ def identify(
         Whether it fell at terminal speed, which tells its drag.
     keep
         Whether published values stand for what the drops cannot determine.
+    to_depth
+        Of a law "ye-2006": down to which depth the drops are of one soil, m, above a harder layer; None: all.
 
     Returns
     -------
@@ -81,6 +85,7 @@ def identify(
     """
     within("fraction", 0.0 if fraction is None else fraction, 0.0, 10.0)
     within("buoyancy", buoyancy, 0.0, MOST_FORCE)
+    within("to_depth", 1.0 if to_depth is None else to_depth, LEAST_DEPTH, MOST_DEPTH)
     one_of("law", law, ("ye-2006", "bearing"))
     one_of("striker_mass", striker_mass, ("reference", "effective"))
     return identified(
@@ -92,6 +97,7 @@ def identify(
         buoyancy=buoyancy,
         terminal=terminal_speed,
         keep=keep,
+        to_depth=to_depth,
     )
 
 
@@ -105,23 +111,35 @@ def identified(
     buoyancy: float = 0.0,
     terminal: bool = False,
     keep: bool = False,
+    to_depth: float | None = None,
 ) -> Identification:
     """Identify a law from drops of a scenario's striker, given as (path, recording) by name.
 
     `form` None: what fits the striker's nose. `fraction` m_b1/m_s, None: the scenario's co-moving mass. `buoyancy` N.
+    `to_depth` m, of rows that are of one soil.
     Raises `InputError`.
     """
     is_cone = isinstance(scenario.vehicle, Striker) and scenario.vehicle.nose == "cone"
+    form = form or ("bearing" if is_cone else "ye-2006")
+    if to_depth is not None and form != "ye-2006":
+        message = f"to_depth: of law ye-2006 alone, got law {form}; without it"
+        raise InputError(Fault(message=message))
     known = {name: recording for name, (_, recording) in recordings.items()}
     settled = ground_law.settled(known, scenario)
-    drops, unusable = ground_law.drops_of(settled.recordings, scenario, buoyancy=buoyancy, terminal=terminal)
+    drops, unusable = ground_law.drops_of(
+        settled.recordings, scenario, buoyancy=buoyancy, terminal=terminal, to_depth=to_depth
+    )
+    share = scenario.ground.co_moving_mass.share if fraction is None else fraction
+    if form == "ye-2006" and not is_cone:  # which that law refuses
+        drops, other = ground_law.of_one_soil(drops, share)
+        unusable += other
     zeros = {**settled.zeros, **ground_law.zeros_of(drops, known)}
     sources = sorted({recording.source for recording in known.values() if recording.source})
     found = ground_law.identified(
         drops,
         {name: digest(path, recording) for name, (path, recording) in recordings.items()},
-        form=form or ("bearing" if is_cone else "ye-2006"),
-        fraction=scenario.ground.co_moving_mass.share if fraction is None else fraction,
+        form=form,
+        fraction=share,
         law_mass=law_mass,
         keep=keep,
         source="; ".join(sources) or "recorded drops",

@@ -36,6 +36,7 @@ from rollover.diagnosis.statements import (
     places,
     sentence,
     step_error_note,
+    tolerance_clause,
     usual_model_error_sentence,
 )
 from rollover.effects import spoken
@@ -120,6 +121,7 @@ def reported(c: Conclusion) -> Diagnosis:
         + offered(law)
         + inconsistency_evidence(c.inconsistencies)
         + contradiction_clause(verdict, contrary)
+        + tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found)
         + no_contact_clause(found),
         p_value=explanation.p_value if shown is None else shown.p_value,
         noise=noise(found),

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rollover.comparison.rating import grade
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Held, held_out
 from rollover.diagnosis.fit.ensemble_mean import refined_by_ensemble_mean
@@ -15,7 +16,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
-from rollover.diagnosis.result import Considered, Named, Place, Share, Verdict
+from rollover.diagnosis.result import Considered, Named, Place, Score, Share, Verdict
 from rollover.diagnosis.selection.decision import Explanation, strongest
 from rollover.diagnosis.selection.forward_step import confusion
 from rollover.diagnosis.settings import SETTINGS
@@ -254,6 +255,20 @@ def noise(dataset: Sequence[Dataset]) -> dict[str, float]:
         for s in e.signals:
             found.setdefault(s.channel, []).append(s.noise)
     return {name: float(np.median(values)) for name, values in found.items()}
+
+
+def tolerance_clause(verdict: Verdict, p_value: float, score: Score | None, dataset: Sequence[Dataset]) -> str:
+    """What a sentence goes on with where curves that a stated tolerance lets pass are poor by ISO/TS 18571."""
+    is_beyond_noise = verdict == "no-mismatch" and p_value < SETTINGS.inference.lack_of_fit.p_value
+    iso = None if score is None else score.iso18571
+    if not is_beyond_noise or iso is None or grade(iso) != "poor":
+        return ""
+    if not any(e.model_error_dominates(s) for e in dataset for s in e.signals):
+        return ""
+    return (
+        f" By ISO 18571 they are poor ({iso:.2f}): what is tolerated may hide an effect; a smaller --tolerance,"
+        " or values known better than their stated uncertainty, would show it."
+    )
 
 
 def sentence(

@@ -11,6 +11,7 @@ from rollover.system.errors import Fault, InputError, hint
 MOST_LATE = 1e10  # s: stamps of an epoch's seconds, now 1.8e9, until the year 2286
 MOST_CLOCK = 1e3  # s: no recording of a rollover or a drop lasts so long, and no offset within it is longer
 MOST_FORCE = 1e6  # N: the weight of 100 t, more than any striker's
+LEAST_DEPTH, MOST_DEPTH = 1e-4, 10.0  # m: a grain of sand, and what no striker of a drop test goes down to
 LONGEST = 1e7  # s: 116 days of wall time
 MOST_MEMORY = 1.4e14  # bytes: the 47 bits of address space that a process has
 SEGMENTS = 12  # elements to a member of a frame: forces and energies within 0.5 % of four times as many (tested)

@@ -17,7 +17,7 @@ from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.inference.scores import misfit_before_impact
 from rollover.diagnosis.noise.ensemble import HeavyTail
-from rollover.diagnosis.result import Interval, Named
+from rollover.diagnosis.result import Interval, Named, Score
 from rollover.diagnosis.sensors_first import in_words
 from rollover.diagnosis.statements import sentence
 from rollover.effects import EFFECTS, units_of
@@ -172,3 +172,25 @@ def test_many_findings_alike_are_counted() -> None:
     said = list(in_words([*(found("stuck", k) for k in range(9)), found("spike", 0)]))
     first = [f"d1: {FORCE}: stuck {k}" for k in range(3)]
     assert said == [*first, f"d1: {FORCE}: 6 more such findings (stuck)", f"d1: {FORCE}: spike 0"]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "p_value", "iso", "is_tolerated", "told"),
+    [
+        ("no-mismatch", 0.0, 0.52, True, True),
+        ("no-mismatch", 0.0, 0.70, True, False),  # fair
+        ("no-mismatch", 0.0, None, True, False),
+        ("no-mismatch", 0.0, 0.52, False, False),  # noise alone is no tolerance that could be smaller
+        ("no-mismatch", 0.9, 0.52, True, False),
+        ("unexplained", 0.0, 0.52, True, False),
+    ],
+)
+def test_a_tolerance_that_lets_poor_curves_pass_is_said(
+    verdict: Any, p_value: float, iso: float | None, is_tolerated: bool, told: bool
+) -> None:
+    dataset: Any = [SimpleNamespace(signals=(None,), model_error_dominates=lambda _: is_tolerated)]
+    score = Score(nrmse=0.8, iso18571=iso, peak_force_error=None)
+    said = statements.tolerance_clause(verdict, p_value, score, dataset)
+    assert ("By ISO 18571 they are poor (0.52): what is tolerated may hide an effect" in said) == told
+    assert bool(said) == told
+    assert statements.tolerance_clause(verdict, p_value, None, dataset) == ""

@@ -17,8 +17,7 @@ from tests.ground.recorded_drops import SPEEDS, TRUTH, recorded
 from tests.ground.reference_drop import solve
 
 
-def test_a_second_branch_that_begins_at_once_is_refused() -> None:
-    """A force that leaps where a hard layer begins: trial steps of the fit go beyond what a number holds."""
+def test_drops_that_all_reach_a_hard_layer_are_refused() -> None:
     import rollover as ro
 
     drops = {
@@ -27,7 +26,9 @@ def test_a_second_branch_that_begins_at_once_is_refused() -> None:
         )
         for speed in (1.5, 2.0, 3.0)
     }
-    with pytest.raises(ro.InputError, match="no drop shows the first branch; both are needed"):
+    with pytest.raises(
+        ro.InputError, match=r"d1.5: K' rises .* m, where the law has it fall: a harder layer; to-depth 0.0992 takes"
+    ):
         ro.identify(drops)
 
 

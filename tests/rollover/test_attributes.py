@@ -51,7 +51,10 @@ def matrix(path: Path, **attributes: Any) -> Recording:
 
 @pytest.mark.parametrize(
     "key",
-    ["gain", "CalFactor", "LSB", "Coefficients", "conversion_factor", "volts_per_count", "Multiplier", "sensitivity"],
+    [
+        *("gain", "CalFactor", "LSB", "Coefficients", "conversion_factor", "volts_per_count", "Multiplier"),
+        *("sensitivity", "conversion", "divisor", "a1", "C1", "tare", "bias", "digital_max", "adc_max"),
+    ],
 )
 def test_whole_numbers_beside_an_unknown_scale_are_refused(tmp_path: Path, key: str) -> None:
     value = [0.0, 0.5] if key == "Coefficients" else 0.5
@@ -78,6 +81,25 @@ def test_a_scale_of_the_array_comes_before_that_of_its_group(tmp_path: Path) -> 
         grouped(tmp_path / "a.h5", {}, {"scale_factor": 9.0})
     with pytest.raises(InputError, match="attribute scale_factor: got 0; any other number"):
         grouped(tmp_path / "a.h5", {"scale_factor": 0.0})
+
+
+@pytest.mark.parametrize("key", ["k", "range", "zero", "resolution_uV", "Umrechnung"])
+def test_no_number_beside_counts_goes_unmentioned(tmp_path: Path, key: str) -> None:
+    found = grouped(tmp_path / "a.h5", {key: 4.0})
+    assert found[FORCE] == pytest.approx(RAW)
+    assert f"run/F: {key} 4 stands beside its numbers, and is not applied; `scale` of a profile does" in found.notes
+    real = grouped(tmp_path / "b.h5", {key: 4.0}, raw=RAW.astype("f8"))
+    assert not any(key in note for note in real.notes)  # measured values have a range and a zero too
+
+
+@pytest.mark.parametrize("key", ["sample_rate", "channel_index", "cfc", "max", "valid_max", "dt"])
+def test_a_known_number_beside_counts_needs_no_word(tmp_path: Path, key: str) -> None:
+    assert not any(key in note for note in grouped(tmp_path / "a.h5", {key: 5000.0}).notes)
+
+
+def test_a_prefix_of_a_unit_is_said(tmp_path: Path) -> None:
+    found = grouped(tmp_path / "a.h5", {"unit_prefix": "k"}, raw=RAW.astype("f8"))
+    assert any("unit_prefix 'k' stands beside its numbers, and is not applied" in note for note in found.notes)
 
 
 def test_what_may_be_a_scale_is_said(tmp_path: Path) -> None:
@@ -156,6 +178,23 @@ def test_steps_and_rates_in_the_unit_beside_them(tmp_path: Path, attributes: dic
         file["F"] = RAW * 1.0
         file.attrs.update(attributes)
     assert named(tmp_path / "a.h5", {"F": f"{FORCE}, unit: N"}).time == pytest.approx(step * np.arange(6))
+
+
+@pytest.mark.parametrize("key", ["decimation", "Downsampling_Factor", "subsample"])
+def test_samples_left_out_beside_a_groups_rate_are_refused(tmp_path: Path, key: str) -> None:
+    """One in four of the group's samples: at its rate they would last a quarter of the time."""
+
+    def held(own: dict[str, Any]) -> Recording:
+        with h5py.File(tmp_path / "a.h5", "w") as file:
+            file["run/F"] = RAW.astype("f8")
+            file["run"].attrs["sample_rate"] = 1000.0
+            file["run/F"].attrs.update({"units": "N", **own})
+        return named(tmp_path / "a.h5", {"run/F": FORCE})
+
+    with pytest.raises(InputError, match=rf"{key.lower()} 4 beside a step of time that is its group's"):
+        held({key: 4})
+    assert held({key: 1}).time[1] == pytest.approx(1e-3)
+    assert held({key: 4, "sample_rate": 250.0}).time[1] == pytest.approx(4e-3)
 
 
 def test_a_step_in_no_unit_of_time_is_refused(tmp_path: Path) -> None:

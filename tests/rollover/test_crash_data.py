@@ -192,3 +192,20 @@ def test_nhtsa_two_tests_in_a_zip(tmp_path: Path) -> None:
     assert read_recording(path, test="v00002")[X] == pytest.approx(3.0 * G * WAVE, abs=1e-5)
     with pytest.raises(InputError, match=r"2 tests, got v00001, v00002; rollover import both.zip makes a recording of"):
         read_recording(path)
+
+
+@pytest.mark.parametrize("status", ["CF", "MD", "ND", "channel failed", "Meaningless data"])
+def test_nhtsa_data_that_are_said_to_be_lost_are_not_read(tmp_path: Path, status: str) -> None:
+    lost = [row.replace("|AM|", f"|{status}|") for row in TWO]
+    path = folder_of(tmp_path, ev5(TWO[0], lost[1]), n001=curve(1.0), n002=curve(2.0))
+    assert f"1 of 2 columns left out, its data status is '{status.upper()}': 002" in read_recording(path).notes
+    (path / "v00001.EV5").write_text(ev5(lost[0], TWO[1]))
+    with pytest.raises(InputError, match=f"column 001: its data status is '{status.upper()}'; a profile without it"):
+        read_recording(path)
+
+
+def test_nhtsa_a_status_that_is_no_loss_is_said(tmp_path: Path) -> None:
+    path = folder_of(tmp_path, ev5(TWO[0].replace("|AM|", "|QD|"), TWO[1]), n001=curve(1.0), n002=curve(2.0))
+    found = read_recording(path)
+    assert found[X] == pytest.approx(G * WAVE, abs=1e-5)
+    assert "001: its data status is 'QD'" in found.notes

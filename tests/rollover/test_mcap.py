@@ -224,3 +224,29 @@ def test_a_joint_that_is_not_in_every_message_has_gaps_there(tmp_path: Path) -> 
     assert named(path, {"/j.effort.knee": N})[FORCE].tolist() == [900.0, 900.0, 900.0]
     with pytest.raises(InputError, match=r"'hip', then of 'knee'"):
         named(path, {"/j.effort.0": N})
+
+
+@pytest.mark.parametrize("frames", ["lrlr", "llrl"])
+def test_sensors_of_one_topic_are_not_mixed(tmp_path: Path, frames: str) -> None:
+    """Two sensors on one topic, told apart by `header.frame_id` alone."""
+    messages = [("/f", k, {"header": {"frame_id": frame}, "v": float(k)}) for k, frame in enumerate(frames)]
+    with pytest.raises(InputError, match=r"its topic has messages of 2 frames in turn \('l', 'r'\), got /f"):
+        named(write(tmp_path / "a.mcap", *messages), {"/f.v": N})
+    renamed = [(topic, at, {**m, "header": {"frame_id": "llrr"[k]}}) for k, (topic, at, m) in enumerate(messages)]
+    assert named(write(tmp_path / "b.mcap", *renamed), {"/f.v": N})[FORCE] == pytest.approx([0, 1, 2, 3])
+
+
+@pytest.mark.parametrize("covariance", [[-1.0, *[0.0] * 8], [-1, 0, 0]])
+def test_a_covariance_of_minus_one_means_no_data(tmp_path: Path, covariance: list[float]) -> None:
+    def imu(k: int) -> dict[str, Any]:
+        turn = {"angular_velocity": {"x": 0.5 * k}, "angular_velocity_covariance": [0.0] * 9}
+        return {**turn, "linear_acceleration": {"z": 9.81}, "linear_acceleration_covariance": covariance}
+
+    path = write(tmp_path / "a.mcap", *(("/imu", k, imu(k)) for k in range(4)))
+    with pytest.raises(InputError, match=r"not a column of numbers over time: no data, by its covariance of -1"):
+        named(path, {"/imu.linear_acceleration.z": N})
+    found = named(path, {"/imu.angular_velocity.x": "chassis/angular_velocity_x, unit: rad/s"})
+    assert found["chassis/angular_velocity_x"] == pytest.approx([0.0, 0.5, 1.0, 1.5])
+    assert any(
+        "1 of " in n and "no data, by its covariance of -1: /imu.linear_acceleration.z" in n for n in found.notes
+    )

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.recording.importers import read_recording
+from rollover.recording.importers import read_recording, tdms
 from rollover.system.errors import InputError
 from tests.rollover.foreign import CASES, FORCE, SINKAGE, left_out, named, needs, peak
 
 needs("nptdms")
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter  # noqa: E402
+from nptdms.reader import TdmsReader  # noqa: E402
 
 RAW = np.array([1, 2, 4, 1799], dtype="i2")
 START = np.datetime64("2024-05-01T10:00:00", "us")
@@ -213,3 +214,44 @@ def test_properties_that_look_like_a_scale_or_a_unit(tmp_path: Path) -> None:
     assert any("Gain 0.5 stands beside its numbers, and is not applied" in note for note in real.notes)
     other = {"wf_increment": 1e-3, "NI_UnitDescription": "kN"}
     assert peak(read_recording(write(tmp_path / "c.tdms", ("g", FORCE, RAW, other)))) == 1.799e6
+
+
+@pytest.mark.parametrize("whose", ["group", "file"])
+def test_a_scale_above_the_channel_is_one_too(tmp_path: Path, whose: str) -> None:
+    def made(raw: Any, how: dict[str, Any]) -> Path:
+        group, root = (how if whose == of else {} for of in ("group", "file"))
+        objects = [RootObject(root), GroupObject("g", group), ChannelObject("g", FORCE, raw, properties=wave())]
+        with TdmsWriter(str(tmp_path / "a.tdms")) as file:
+            file.write_segment(objects)
+        return tmp_path / "a.tdms"
+
+    above = "of its group" if whose == "group" else "of the file"
+    with pytest.raises(InputError, match=f"whole numbers beside gain 2 {above}, which TDMS does not define"):
+        read_recording(made(RAW, {"gain": 2.0}))
+    real = read_recording(made(RAW.astype("f8"), {"gain": 2.0}))
+    assert peak(real) == 1799.0
+    assert any(f"gain 2 {above} stands beside its numbers" in note for note in real.notes)
+    assert peak(read_recording(made(RAW, {"serial_number": 2.0}))) == 1799.0
+
+
+@pytest.mark.parametrize("key", ["NoValue", "novalue", "missing_value", "_FillValue"])
+@pytest.mark.parametrize("mark", [-9999, -1e36])
+def test_a_mark_of_gaps_marks_gaps(tmp_path: Path, key: str, mark: float) -> None:
+    values = np.array([1.0, 2.0, mark, 1799.0])
+    found = read_recording(write(tmp_path / "a.tdms", ("g", FORCE, values, wave(**{key: float(mark)}))))
+    assert found[FORCE] == pytest.approx([1.0, 2.0, np.nan, 1799.0], nan_ok=True)
+    assert any("1 of 4 values are gaps" in note for note in found.notes)
+
+
+def test_what_a_file_says_of_itself_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = appended(tmp_path / "a.tdms", (RAW, started(0.0)), (RAW, started(10.0)))
+    read, metadata = [], TdmsReader.read_metadata
+
+    def counted(self: Any, *args: Any, **more: Any) -> Any:
+        read.append(self)
+        return metadata(self, *args, **more)
+
+    monkeypatch.setattr(TdmsReader, "read_metadata", counted)
+    (signal,) = tdms._signals(path, None).values()
+    assert len(read) == 1
+    assert signal.notes == ("2 pieces by their wf_start_time, at 0, 10 s",)

@@ -114,3 +114,27 @@ def test_an_empty_row_is_a_sample_where_the_rate_counts_them(tmp_path: Path) -> 
     found = read(tmp_path, rows, "rate: 10\n", F=f"{FORCE}, unit: N")
     assert found[FORCE] == pytest.approx([0, 1, NAN, NAN, 4, 5], nan_ok=True)
     assert found.time == pytest.approx(0.1 * np.arange(6))
+
+
+def test_of_columns_with_one_name_the_profile_chooses_by_place(tmp_path: Path) -> None:
+    rows = [["t", "F", "F"], *([0.1 * k, float(k), 2.0 * k] for k in range(4))]
+    with pytest.raises(
+        InputError, match=r"two columns mean .* got 'F \(column 2\)' and 'F \(column 3\)'; a profile chooses"
+    ):
+        read(tmp_path, rows)
+    found = read(tmp_path, rows, **{"t": "time, unit: s", "F (column 3)": f"{FORCE}, unit: N"})
+    assert found[FORCE] == pytest.approx([0, 2, 4, 6])
+    assert any("1 of 3 columns left out, without a description: F (column 2)" in note for note in found.notes)
+    beside = [["t", "F", None, "t", "F"], *([0.1 * k, float(k), None, 5 + 0.1 * k, 2.0 * k] for k in range(4))]
+    with pytest.raises(InputError, match=r"two columns mean time, got 't \(column 1\)' and 't \(column 4\)'"):
+        read(tmp_path, beside)
+
+
+@pytest.mark.parametrize("at", [range(4), [2]])
+def test_a_formula_without_its_value_is_no_gap(tmp_path: Path, at: Sequence[int]) -> None:
+    """A program that does not work formulas out, such as openpyxl, writes none of their values."""
+    rows = [["t", "F", "z"], *([0.1 * k, f"=2*{k}" if k in at else float(k), 0.01 * k] for k in range(4))]
+    with pytest.raises(InputError, match=r"a formula without its value, got '=2\*\d'; saved by a program"):
+        read(tmp_path, rows)
+    found = read(tmp_path, rows, t="time, unit: s", z=f"{FORCE}, unit: N")
+    assert any("1 of 3 columns left out, a formula without its value" in note for note in found.notes)

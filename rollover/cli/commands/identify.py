@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.cli.commands.common import AsJson, Force, Setting, answering, app, manual, settings
-from rollover.system.arguments import MOST_FORCE
+from rollover.system.arguments import LEAST_DEPTH, MOST_DEPTH, MOST_FORCE
 from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -60,6 +60,12 @@ def identify_(
         bool, typer.Option("--terminal-speed", help="It fell at terminal speed: take the drag from there.")
     ] = False,
     keep: Annotated[bool, typer.Option("--keep", help="Published values for what the drops cannot determine.")] = False,
+    to_depth: Annotated[
+        float | None,
+        typer.Option(
+            min=LEAST_DEPTH, max=MOST_DEPTH, help="Down to which depth it is one soil, m.", show_default="all of it"
+        ),
+    ] = None,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/identify/NAME")] = None,
     force: Force = False,
@@ -92,6 +98,7 @@ def identify_(
         buoyancy=buoyancy,
         terminal=terminal_speed,
         keep=keep,
+        to_depth=to_depth,
     )
     report = identification.json_of(answer)
     _write(folder, answer, report, shlex.join(["rollover", "identify", *recordings]))

@@ -125,7 +125,7 @@ def _scale_around(thing: Array) -> tuple[str, str]:
     A group's scale is no convention: it may be that of one of its arrays, or of all.
     """
     unknown = cf.unknown_scale(thing.attributes, thing.dtype)
-    own = cf.other_scales(thing.attributes) or cf.beside(thing.attributes)
+    own = cf.other_scales(thing.attributes) or cf.beside(thing.attributes, thing.dtype)
     groups = [said for level in thing.around if level is not thing.attributes and (said := cf.stated_scale(level))]
     if not groups or cf.stated_scale(thing.attributes):
         return unknown, own

@@ -22,6 +22,9 @@ _PACKED = ("scale_factor", "add_offset")
 _MARKS = ("_FillValue", "missing_value", "valid_range", "valid_min", "valid_max")  # of what is no measured value
 _OTHER_SCALES: tuple[str, ...] = ("scale", "scaling", "gain", "slope", "factor", "calib", "sensitiv", "multipl")
 _OTHER_SCALES += ("offset", "intercept", "coef", "polynom", "percount", "perbit", "perlsb", "lsb", "countsper")
+_OTHER_SCALES += ("conversion", "divisor", "bias", "tare", "physicalm", "digitalm", "adcm")
+_NEUTRAL_AT_NOUGHT = "offset|intercept|bias|tare"
+_TERM = re.compile("[a-dk]_?[0-9]", re.IGNORECASE)  # a0, C1: of a polynomial
 _NO_SCALES: tuple[str, ...] = ("time", "start", "utc", "wf", "sampl", "decimat", "compress", "shuffle", "crest")
 _NO_SCALES += (
     "date",
@@ -39,6 +42,35 @@ _NO_SCALES += (
     "source",
 )
 _BESIDE = ("resolution", "exponent")  # may be told for information only
+_OF_TIME: tuple[str, ...] = (
+    "dt",
+    "delta",
+    "step",
+    "interval",
+    "period",
+    "rate",
+    "fs",
+    "freq",
+    "tzero",
+    "duration",
+    "clock",
+    "trigger",
+)
+_OF_TIME += (
+    "index",
+    "channel",
+    "count",
+    "id",
+    "min",
+    "max",
+    "mean",
+    "average",
+    "rms",
+    "std",
+    "version",
+    "cfc",
+    "filter",
+)
 _UNITS: tuple[str, ...] = ("unitstring", "unitsstring", "unitname", "unitlabel", "unitsymbol", "unitdescription")
 _UNITS += ("niunitdescription", "engineeringunit", "engineeringunits", "engunit", "engunits", "eu", "uom", "einheit")
 _UNITS += ("physicalunit", "physicalunits", "measurementunit", "channelunit", "dataunit", "yunit", "yunits")
@@ -181,9 +213,10 @@ def other_scales(attributes: Attributes) -> str:
     for key, value in attributes.items():
         name = _letters(key)
         is_scale = any(word in name for word in _OTHER_SCALES) and not any(word in name for word in _NO_SCALES)
+        is_scale = is_scale or _TERM.fullmatch(key) is not None
         if is_scale and (numbers := _all_numbers(value)) is not None and numbers.size <= _MOST_COEFFICIENTS:
             found[key] = numbers
-    neutral = {key: float(not re.search("offset|intercept", key, re.IGNORECASE)) for key in found}
+    neutral = {key: float(not re.search(_NEUTRAL_AT_NOUGHT, key, re.IGNORECASE)) for key in found}
     return ", ".join(
         f"{key} {' '.join(f'{v:g}' for v in numbers)}"
         for key, numbers in found.items()
@@ -191,10 +224,20 @@ def other_scales(attributes: Attributes) -> str:
     )
 
 
-def beside(attributes: Attributes) -> str:
-    """Attributes that may or may not be a scale, in words."""
+def beside(attributes: Attributes, dtype: np.dtype[Any]) -> str:
+    """Attributes that may or may not be a scale, in words: beside whole numbers all whose meaning is not known."""
     found = {key: number(attributes[key]) for key in attributes if _letters(key) in _BESIDE}
-    return ", ".join(f"{k} {v:g}" for k, v in found.items() if v is not None)
+    if dtype.kind in "iu":
+        known = (*_NO_SCALES, *_OF_TIME)
+        strange = [k for k in attributes if k.replace("_", "").lower() not in _SPELT]
+        found |= {k: number(attributes[k]) for k in strange if not any(word in _letters(k) for word in known)}
+    said = [f"{k} {v:g}" for k, v in found.items() if v is not None and v != 1.0]
+    return ", ".join(said + [f"{k} {text(v)!r}" for k, v in attributes.items() if "prefix" in _letters(k) and text(v)])
+
+
+def with_gaps(values: NDArray[np.float64], attributes: Attributes) -> tuple[NDArray[np.float64], list[str]]:
+    """Numbers with NaN where attributes mark a gap, and their count. Raises ``ValueError`` for marks that are none."""
+    return decoded(values, {key: value for key, value in spelt(attributes).items() if key in _MARKS})
 
 
 def time_of(values: NDArray[Any], attributes: Attributes) -> tuple[NDArray[np.float64], int] | None:

@@ -18,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.recording import Recording
+from rollover.recording.importers import cf
 from rollover.recording.importers import mme_codes as codes
+from rollover.recording.importers.data_status import judged
 from rollover.recording.importers.importer import Importer
 from rollover.recording.importers.mme_archive import content, names_in
 from rollover.recording.importers.mme_listing import promised, stray
@@ -290,7 +292,12 @@ def _signal(place: Path, channel: _Channel, channels: list[_Channel]) -> Signal:
         return Signal(values=channel.values, unit=unit)
     time = _time(place, channel, channels)
     cfc, note = _cfc(channel)
-    return Signal(values=channel.values, unit=unit, time=time, cfc=cfc, channel=channel.known, notes=note)
+    lost, status = judged(_value(channel.head, "data status"))
+    scale = cf.stated_scale({key.replace(" ", "_"): value for key, value in channel.head.items()})
+    notes = (*note, *status, *([cf.not_applied(scale)] if scale else []))
+    return Signal(
+        values=channel.values, unit=unit, time=time, cfc=cfc, channel=channel.known, notes=notes, unreadable=lost
+    )
 
 
 def _cfc(channel: _Channel) -> tuple[int | None, tuple[str, ...]]:

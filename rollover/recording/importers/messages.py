@@ -30,6 +30,9 @@ class _NoNumber(str):
     """Why a field is no number."""
 
 
+_NO_DATA = _NoNumber("no data, by its covariance of -1")
+
+
 @dataclass(frozen=True)
 class _Instant:
     """A stamp in a message, ns."""
@@ -63,15 +66,16 @@ class Messages:
         self._topic_of: dict[str, str] = {}
         self._owners: dict[str, str] = {}  # entry of an array -> what the names beside it say that it is of
         self._reordered: dict[str, str] = {}  # the same -> what it is of later on
-        self._sources: dict[str, list[int]] = {}  # topic -> who wrote its messages, in the order of their turns
+        self._sources: dict[str, list[tuple[int, str]]] = {}  # topic -> whose its messages are, in the order of turns
         self._count = 0
         self._claimed = Budget(path)
 
     def add(self, topic: str, logged: int, message: Any, source: int = 0) -> None:
         """A message, when it was logged, ns, and which of the topic's channels it came by. Raises `InputError`."""
         turns = self._sources.setdefault(topic, [])
-        if source not in turns[-1:] and len(turns) < _TURNS:
-            turns.append(source)
+        turn = source, _frame(message)
+        if turn not in turns[-1:] and len(turns) < _TURNS:
+            turns.append(turn)
         number = len(self._logged.setdefault(topic, []))
         self._logged[topic].append(logged)
         for name in self._times:
@@ -117,7 +121,7 @@ class Messages:
                 continue
             turns = self._sources[topic]
             if len(turns) > len(set(turns)):  # a recorder that began anew takes one turn after the other
-                who = f"{len(set(turns))} publishers at the same time"
+                who = _said_of(turns)
                 found[name] = Signal(values=np.empty(0), unreadable=f"its topic has messages of {who}, got {topic}")
                 continue
             values = np.array(column.values, dtype=np.float64)
@@ -205,7 +209,9 @@ class Messages:
             owners: Sequence[str] = next((parts[key] for key in _NAMES if _are_names(parts.get(key))), ())
             for key, part in parts.items():
                 inner = f"{name}.{key}"
-                if owners and key not in _NAMES and _is_array(part) and len(part) == len(owners):
+                if _is_without_data(parts.get(f"{key}_covariance")):
+                    yield from ((leaf, _NO_DATA) for leaf, _ in self._leaves(inner, part))
+                elif owners and key not in _NAMES and _is_array(part) and len(part) == len(owners):
                     yield from self._owned(inner, part, owners)
                 else:
                     yield from self._leaves(inner, part)
@@ -229,6 +235,28 @@ class Messages:
             inner = f"{name}.{k}"
             if len(values) <= _LONGEST or inner in self._wanted or inner in self._on_the_way:
                 yield from self._leaves(inner, value)
+
+
+def _frame(message: Any) -> str:
+    """In whose axes a message is: `header.frame_id`, which tells sensors apart that publish to one topic."""
+    header = (message if isinstance(message, Mapping) else _parts(message)).get("header", {})
+    frame = (header if isinstance(header, Mapping) else _parts(header)).get("frame_id", "")
+    return frame if isinstance(frame, str) else ""
+
+
+def _said_of(turns: Sequence[tuple[int, str]]) -> str:
+    """Publishers or frames that take turns, in words."""
+    frames = sorted({frame for _, frame in turns})
+    if len(frames) > 1:
+        return f"{len(frames)} frames in turn ({', '.join(map(repr, frames[:4]))})"
+    return f"{len(set(turns))} publishers at the same time"
+
+
+def _is_without_data(covariance: Any) -> bool:
+    """Whether a covariance says by -1 that nothing was measured, as the comments of sensor_msgs/Imu have it."""
+    return (
+        _is_array(covariance) and len(covariance) > 0 and not isinstance(covariance[0], str) and covariance[0] == -1.0
+    )
 
 
 def _is_array(value: Any) -> bool:

@@ -14,6 +14,7 @@ from typing import NoReturn
 import numpy as np
 
 from rollover.recording import Recording
+from rollover.recording.importers.data_status import judged
 from rollover.recording.importers.importer import Importer
 from rollover.recording.importers.mme_archive import content, names_in
 from rollover.recording.importers.polarity import sign
@@ -116,7 +117,10 @@ def _recording(path: Path, profile: Described | None, test: _Test) -> Recording:
             signals[name] = left_out(e.faults[0].message if isinstance(e, InputError) else f"X is no time: {e}")
             continue
         unit = UNITS.get(row.get("YUNITS", ""), row.get("YUNITS", ""))
-        signals[name] = Signal(values=values, time=time, unit=unit, channel=_channel(row))
+        lost, status = judged(row.get("DASTAT", ""))
+        signals[name] = Signal(
+            values=values, time=time, unit=unit, channel=_channel(row), unreadable=lost, notes=status
+        )
     found = assemble(path, signals, profile)
     notes = list(found.notes)
     if listed:

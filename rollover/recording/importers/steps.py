@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -25,6 +26,7 @@ _STEPS: tuple[str, ...] = (
 _STEPS += ("sampling_period",)
 _RATES = ("sample_rate", "sampling_rate", "samplerate", "fs", "sample_frequency", "sampling_frequency")
 _STARTS = ("t0", "wf_start_offset", "wf_start_time")
+_THINNED = ("decimat", "downsampl", "subsampl", "undersampl", "everynth")
 HERTZ = {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "1/s": 1.0, "S/s": 1.0, "kS/s": 1e3}
 _SAME = 1e-6  # relative: what a rate of six digits differs from its step
 
@@ -39,6 +41,10 @@ def even_stamps(around: Iterable[Mapping[str, Any]], count: int) -> tuple[NDArra
     step = next((found for level in levels if (found := _step(level)) is not None), None)
     if step is None:
         return None, None
+    if _step(levels[0]) is None and (thinned := _thinned(levels[0])):
+        raise ValueError(
+            f"{thinned} beside a step of time that is its group's: of which samples is not said; a column of time"
+        )
     offset, began = 0.0, None
     for key in _STARTS:
         value = next((level[key] for level in levels if key in level), None)
@@ -52,6 +58,12 @@ def even_stamps(around: Iterable[Mapping[str, Any]], count: int) -> tuple[NDArra
         else:
             offset += start
     return np.asarray(offset + step * np.arange(count), dtype=np.float64), began
+
+
+def _thinned(level: Mapping[str, Any]) -> str:
+    """What says that only every so many samples of its group's are there, in words; nothing where all are."""
+    found = {k: number(v) for k, v in level.items() if any(word in re.sub("[^a-z]", "", k) for word in _THINNED)}
+    return ", ".join(f"{k} {v:g}" for k, v in found.items() if v is not None and v not in (0.0, 1.0))
 
 
 def _in_unit(level: Mapping[str, Any], key: str, known: Mapping[str, float]) -> float | None:

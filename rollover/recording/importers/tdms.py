@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from rollover.recording.importers.columns import is_wanted, no_numbers
 from rollover.recording.importers.importer import Importer, check_claim, check_library, library, reading, starts_with
 from rollover.recording.importers.sidecar import Described
 from rollover.recording.importers.signals import Signal, assemble, left_out
-from rollover.recording.importers.tdms_pieces import continued, pieces_of
+from rollover.recording.importers.tdms_pieces import continued, opened
 from rollover.spec.channels import UNITS
 from rollover.system.boundary import worded
 from rollover.system.errors import Fault, InputError
@@ -47,11 +48,12 @@ def _read(path: Path, profile: Described | None) -> Recording:
 def _signals(path: Path, profile: Described | None) -> dict[str, Signal]:
     nptdms = library("nptdms", "tdms", path)
     signals: dict[str, Signal] = {}
-    with reading(path, "TDMS"), nptdms.TdmsFile.open(str(path), raw_timestamps=True) as file:
+    with reading(path, "TDMS"), ExitStack() as held:
+        file, pieces = opened(nptdms, path)
+        held.enter_context(file)
         if file.file_status.incomplete_final_segment:
             message = "cut off, got less than its last segment claims; a whole file is needed"
             raise InputError(Fault(file=str(path), message=message))
-        pieces = pieces_of(nptdms, path)
         channels = [(group, channel) for group in file.groups() for channel in group.channels()]
         check_claim(path, sum(len(channel) for _, channel in channels), most_per_byte=1.0)
         for group, channel in channels:
@@ -64,7 +66,7 @@ def _signals(path: Path, profile: Described | None) -> dict[str, Signal]:
                 found = Signal(values=np.empty(0), unreadable=changed) if changed else _signal(channel, levels, starts)
                 states_scale = profile is not None and bool({name, channel.name} & profile.scaled)
                 if not found.left_out and not found.unreadable and not states_scale:
-                    found = _beside_scale(found, channel)
+                    found = _beside_scale(found, channel, levels)
                 signals[name] = replace(found, channel=about, shared=channel.name)
             else:
                 is_text = channel.data_type.__name__ == "String"
@@ -73,10 +75,15 @@ def _signals(path: Path, profile: Described | None) -> dict[str, Signal]:
     return signals
 
 
-def _beside_scale(found: Signal, channel: Any) -> Signal:
-    """A column beside a property that looks like a scale: whole numbers are counts, others may be scaled already."""
-    own = {key: value for key, value in channel.properties.items() if not key.startswith(("NI_", "wf_"))}
-    said = cf.stated_scale(own)
+def _beside_scale(found: Signal, channel: Any, levels: Sequence[Properties]) -> Signal:
+    """A column beside a property that looks like a scale: whole numbers are counts, others may be scaled already.
+
+    The property is its own, its group's or the file's.
+    """
+    told = (cf.stated_scale({k: v for k, v in level.items() if not k.startswith(("NI_", "wf_"))}) for level in levels)
+    said = next(
+        (f"{one}{whose}" for one, whose in zip(told, ("", " of its group", " of the file"), strict=True) if one), ""
+    )
     is_scaled = any(key.endswith("]_Scale_Type") for key in channel.properties)
     is_clock = found.began is not None and found.time is None
     if not said or is_clock:
@@ -119,7 +126,8 @@ def _signal(channel: Any, levels: tuple[Properties, ...], starts: Sequence[tuple
     is_set = began is not None and began != -_FROM_1904 * stamps.NANO  # LabVIEW writes 1904 where none was set
     unit = str(properties.get("unit_string", "")) or cf.unit_of(properties)
     began = began if is_set else None
-    return Signal(values=values.astype(np.float64), unit=unit, time=time, began=began, notes=tuple(notes))
+    values, gaps = cf.with_gaps(values.astype(np.float64), properties)
+    return Signal(values=values, unit=unit, time=time, began=began, notes=(*notes, *gaps))
 
 
 def _stamps(properties: Properties, count: int) -> NDArray[np.float64] | None:

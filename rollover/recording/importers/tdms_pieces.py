@@ -28,8 +28,8 @@ class Pieces:
     changed: Mapping[str, str] = field(default_factory=dict)  # in words
 
 
-def pieces_of(nptdms: Any, path: Path) -> Pieces:
-    """Read what each piece of a file says anew."""
+def opened(nptdms: Any, path: Path) -> tuple[Any, Pieces]:
+    """A file of `nptdms` that is open for its data, and what each of its pieces says anew, from one reading."""
     starts: dict[str, list[tuple[int, Any]]] = {}
     changed: dict[str, str] = {}
 
@@ -56,12 +56,14 @@ def pieces_of(nptdms: Any, path: Path) -> Pieces:
                         changed.setdefault(name, f"{key} changes within the file, got {known.get(key)} and {value}")
             super()._update_object_properties(segment_object_properties)
 
-    reader = Reader(str(path))
-    try:
-        reader.read_metadata()
-    finally:
-        reader.close()
-    return Pieces(starts=starts, changed=changed)
+    class File(nptdms.TdmsFile):  # type: ignore[misc]
+        def _read_file(self, reader: Any, only_metadata: bool, keep_open: bool) -> None:
+            reader.close()
+            self._reader = Reader(str(path))
+            super()._read_file(self._reader, only_metadata, keep_open)
+
+    file = File(str(path), raw_timestamps=True, read_metadata_only=True, keep_open=True)
+    return file, Pieces(starts=starts, changed=changed)
 
 
 def continued(

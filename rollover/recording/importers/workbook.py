@@ -32,6 +32,13 @@ class Moment:
     days: float
 
 
+@dataclass(frozen=True)
+class Formula:
+    """A cell with a formula whose value the file does not hold."""
+
+    text: str
+
+
 def read_workbook(path: Path, *, empty: bool = False) -> Mapping[str, list[Row]]:
     """Rows of each sheet by its name, numbers as they were last worked out. Raises `InputError`.
 
@@ -78,9 +85,14 @@ def _rows(path: Path) -> dict[str, list[Row]]:
             claimed = Budget(path)
             for info in archive.infolist():
                 claimed.claim(IN_CELLS * info.file_size, info.filename)
+            has_formulas = any(b"<f" in archive.read(i) for i in archive.infolist() if "sheets/" in i.filename)
         file.seek(0)
         book = openpyxl.load_workbook(file, read_only=True, data_only=True)
-        found = {sheet.title: list(_filled(sheet, claimed)) for sheet in book.worksheets}
+        texts: dict[str, Any] = {}
+        if has_formulas:
+            file.seek(0)
+            texts = {s.title: s for s in openpyxl.load_workbook(file, read_only=True, data_only=False).worksheets}
+        found = {sheet.title: list(_filled(sheet, claimed, texts.get(sheet.title))) for sheet in book.worksheets}
         if not any(
             isinstance(value, dt.date | dt.time | dt.timedelta) for r in found.values() for x in r for value in x
         ):
@@ -94,6 +106,11 @@ def _rows(path: Path) -> dict[str, list[Row]]:
             sheet: [tuple(map(_moment, row, plain[sheet][i], repeat(zero))) for i, row in enumerate(rows)]
             for sheet, rows in found.items()
         }
+
+
+def _without_value(value: Any, text: Any) -> Any:
+    """A cell's value, or its formula where the program that wrote it worked out none."""
+    return Formula(text) if value is None and isinstance(text, str) and text.startswith("=") else value
 
 
 _FORMATS = ("_date_formats", "_timedelta_formats")
@@ -120,13 +137,16 @@ def _moment(value: Any, plain: Any, zero: float) -> Any:
 _ONE_DAY = dt.timedelta(days=1)
 
 
-def _filled(sheet: Any, claimed: Budget) -> Iterator[Row]:
+def _filled(sheet: Any, claimed: Budget, texts: Any = None) -> Iterator[Row]:
     """Rows to the last with a value in it, those without one as none; a row is as wide as its last cell says.
 
-    Raises `InputError`.
+    `texts` is the same sheet with formulas in place of their values. Raises `InputError`.
     """
     empty = 0  # programs write 65536 of them at the end
-    for row in sheet.iter_rows(values_only=True):
+    formulas = repeat(()) if texts is None else texts.iter_rows(values_only=True)
+    for row, told in zip(sheet.iter_rows(values_only=True), formulas, strict=False):
+        if told and None in row:
+            row = tuple(map(_without_value, row, told))
         claimed.claim(PLACE * len(row), f"sheet {sheet.title}")
         if all(value is None for value in row):
             empty += 1

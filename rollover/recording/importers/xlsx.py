@@ -24,7 +24,7 @@ from rollover.recording.importers.plain import columns_of, sidecar_of, table_of
 from rollover.recording.importers.sidecar import DATE_TIME, Csv, Described, Profile, described_inside
 from rollover.recording.importers.signals import Signal, assemble, left_out
 from rollover.recording.importers.stamps import NANO
-from rollover.recording.importers.workbook import DAY, Moment, Row, read_workbook, write_workbook
+from rollover.recording.importers.workbook import DAY, Formula, Moment, Row, read_workbook, write_workbook
 from rollover.system.writing import check_free, put
 
 CHANNELS, ABOUT = "channels", "about"
@@ -91,16 +91,18 @@ def _signals(sheets: Mapping[str, Sequence[Row]], how: Csv, *, counted: bool) ->
     for sheet, rows in filled.items():
         names, units, data = _rows_of(rows, how)
         data = data if counted else [row for row in data if row]
-        for i, head in enumerate(names):
-            if head is None:
+        heads = ["" if head is None else " ".join(str(head).split()) for head in names]
+        for i, name in enumerate(heads):
+            if not name:
                 continue
-            name = " ".join(str(head).split())
             cells = [row[i] if i < len(row) else None for row in data]
             cells = [None if isinstance(cell, str) and cell in how.gaps else cell for cell in cells]
             unit = str(units[i]).strip() if i < len(units) and units[i] is not None else in_brackets(name)
             full = f"{sheet}/{name}" if len(filled) > 1 else name
-            full = full if full not in signals else f"{full} (column {i + 1})"
-            signals[full] = _signal(cells, unit, shared=name if len(filled) > 1 else "")
+            is_shared = len(filled) > 1
+            if heads.count(name) > 1:
+                full, is_shared = f"{full} (column {i + 1})", True
+            signals[full] = _signal(cells, unit, shared=name if is_shared else "")
     return signals
 
 
@@ -114,6 +116,10 @@ def _signal(cells: Sequence[Any], unit: str, shared: str) -> Signal:
     if other is not None:
         if (found := _moments(cells)) is not None:
             return replace(found, shared=shared)
+        formula = next((cell for cell in cells if isinstance(cell, Formula)), None)
+        if formula is not None:
+            got = repr(formula.text[:40])
+            return left_out(f"a formula without its value, got {got}; saved by a program that works it out, it has one")
         if isinstance(other, Moment):
             return left_out(f"cells of a {other.kind} beside others")
         if isinstance(other, str) and any(isinstance(cell, (int, float)) for cell in cells):
