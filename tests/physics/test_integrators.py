@@ -39,6 +39,7 @@ DURATIONS = {
     "drop_test": 0.4,
     "field_upset_side": 1.5,
     "field_upset_tubes": 1.5,
+    "forwarder_overturn": 1.0,
     "forward_pitch": 0.8,  # later one of both halves a step, and its rows lie elsewhere
     "kerb_trip": 0.6,
     "multiple_roll": 1.2,
@@ -52,6 +53,7 @@ DURATIONS = {
     "side_overturn_slope": 1.0,
     "soil_trip": 1.0,
     "tractor_drop_corner": 0.5,
+    "trailer_overturn": 1.0,
 }
 REFUSED = {"driven_pile", "pendulum", "static_rops_test", "tilt_table", "tilt_table_recorded", "vibrating_plate"}
 EQUAL = 1e-6  # of the largest value of a channel, or of its vector, before the first impact
