@@ -203,6 +203,8 @@ def _why_not(scenario: Scenario, t: Tables, heading: float) -> tuple[str, str]:
     if least < slope:
         steep = f"ground of {math.degrees(slope):.3g} deg, which it turns over on from {math.degrees(least):.3g} deg"
         return steep, "a gentler ground.surface, another heading, or 'drop'"
+    if not is_flat(scenario.ground.surface):
+        return "no static equilibrium, as where a wheel stands on an edge", "another initiation.position, or 'drop'"
     return "no static equilibrium", "'drop' or 'tip-over'"
 
 

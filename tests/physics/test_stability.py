@@ -271,7 +271,7 @@ def test_the_same_as_the_tilt_table() -> None:
 
 @pytest.mark.parametrize("heading_deg", [165.0, 180.0])
 def test_front_wheels_that_roll_without_an_axle(heading_deg: float) -> None:
-    """Downhill the locked rear wheels alone hold it, until they all but lift: at most the rigid closed form, stiff tyres.
+    """Downhill the locked rear wheels alone hold it, until they all but lift: stiff tyres, the rigid closed form.
 
     b cos(a) - h sin(a) is their load over that on level ground times b: 0.02 of it are 0.02 b/(b sin(a) + h cos(a)) of
     slope before they carry nothing.

@@ -201,6 +201,7 @@ FALLS = {
     "side_by_side": ("side_overturn", "bank_overturn"),
     "mini_excavator": ("side_overturn", "side_overturn_slope"),
     "electric_tractor": ("side_overturn", "ditch"),
+    "tractor_trailer": ("side_overturn_slope",),  # and trailer_overturn, forwarder_overturn
 }
 
 
