@@ -35,6 +35,7 @@ SITE = {  # caption -> pages, in the order of the menu
         "docs/rops_from_sections",
         "docs/inputs",
         "docs/occupant",
+        "docs/articulated",
         "docs/viewing",
         "docs/commands",
         "docs/python",

@@ -53,6 +53,9 @@ def asked(scenario: Scenario, given: Mapping[str, Any] | None = None) -> Asked:
     if not isinstance(vehicle, Vehicle):
         message = f"has no wheels, got {vehicle.name!r}; a vehicle of kind 'vehicle'"
         raise InputError(Fault(path="vehicle", message=message))
+    if vehicle.trailer is not None:
+        message = f"the calculation knows no trailer, got {vehicle.name!r} with one; a vehicle without"
+        raise InputError(Fault(path="vehicle.trailer", message=message))
     known = {**_known(vehicle)}
     origins = dict.fromkeys(known, "vehicle")
     known.update(given)

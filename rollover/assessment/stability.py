@@ -38,6 +38,9 @@ STEEPEST = math.radians(80.0)
 GONE = 0.35  # rad against the slope, beyond the axle's swing: further over, it lies rather than stands
 GRIP = 1e9  # friction coefficient of a wheel that a stop holds: as long as it carries anything
 UNLOADED = 0.002  # share of its load on level ground with which a wheel carries, and holds, nothing
+# share of their load on level ground below which wheels that alone hold a vehicle and do not come to rest let it roll
+# off: to hold it they would need some fifty times their load as friction; a degree of slope before they lift
+SLIPS = 0.02
 REST = 1e-5  # residual forces and moments over the weight
 NEAR, LEAST, SADDLE = 0.1, 1e-6, 1e-5  # m or rad at a time; damping, and instability, over the contacts' stiffness
 NUDGE = 1e-4
@@ -90,6 +93,9 @@ def stability_angles(
     if not isinstance(vehicle, Vehicle) or len(sides) < 3 or not min(sides) < 0.0 < max(sides):
         message = f"needs wheels to stand on, got {vehicle.name!r}; at least three wheels, on both sides"
         raise InputError(Fault(path="vehicle", message=message))
+    if vehicle.trailer is not None:
+        message = f"a slope for a heading takes one rigid vehicle, got {vehicle.name!r} with a trailer; one without"
+        raise InputError(Fault(path="vehicle.trailer", message=message))
     still = _still(scenario, vehicle)
     bodies = bodies_of(still.vehicle, still.ground.elements)
     t = tables_of(still, bodies)
@@ -210,6 +216,8 @@ class _Tilt:
             held = bool((self.memory[:, E_FORCE_NOW] > UNLOADED * self.loads)[self.holds].any())
             if abs(u[PITCH]) > GONE or abs(u[ROLL]) > GONE + min(self.swing, GONE) or not held:
                 return self._stance(slope, u, gone=True)
+        if (self.memory[:, E_FORCE_NOW] / self.loads)[self.holds].max() < SLIPS:
+            return self._stance(slope, u, gone=True)
         raise ArithmeticError(
             f"no rest was found on a slope of {math.degrees(slope):.2f} deg at heading "
             f"{math.degrees(self.statics.heading):g} deg, got a residual of {np.max(np.abs(r)):.1e}"

@@ -16,10 +16,10 @@ from ground.settings import settings
 from ground.surface import is_flat, normal
 from ground.surface import tables as surface_tables
 from rollover.dynamics.bodies import Body, bodies_of, nose_share
-from rollover.dynamics.occupant import link_rows
+from rollover.dynamics.links import link_rows
 from rollover.dynamics.rows import joint_rows, mount_rows, term_rows, turning_rows, upright, wheel_rows
 from rollover.effects import acting
-from rollover.kernels import occupant, terms
+from rollover.kernels import links, terms
 from rollover.kernels import tables as c
 from rollover.kernels.applied_forces import ACCOUNTS, HISTORY, coefficients
 from rollover.kernels.tables import Tables
@@ -50,10 +50,10 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     spin_i, spin_f, drive = turning_rows(scenario, wheel_f, 6 * nb)
     for w in np.flatnonzero(spin_i >= 0).tolist():
         # a turning wheel's inertia about its axle is not its carrier's
-        at = 6 * row[wheels[w].carrier] + 3
+        at = 6 * row[wheels[w].hub] + 3
         axle = wheel_f[w, c.W_AXIS : c.W_AXIS + 3]
         mass[at : at + 3, at : at + 3] -= spin_f[w, c.P_INERTIA] * np.outer(axle, axle)
-    wheel_i = np.array([row[w.carrier] for w in wheels], dtype=np.int64)
+    wheel_i = np.array([row[w.hub] for w in wheels], dtype=np.int64)
     mount_f, mount_i = mount_rows(vehicle, bodies, row)
     joint_i, joint_f, axle_f, axle_i = joint_rows(vehicle, bodies, row)
     term_i, term_f = term_rows(scenario, bodies)
@@ -162,7 +162,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         pieces=np.zeros((0, 0)),
         link_i=link_i,
         link_f=link_f,
-        link_memory=np.zeros((len(link_i), occupant.LINK_MEMORY)),
+        link_memory=np.zeros((len(link_i), links.LINK_MEMORY)),
         link_out=link_out,
     )
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ground.array import Elements
 from rollover.spec.inertia import MassProperties
 from rollover.spec.shapes import Disc, Shape, SurfacePoints, cone, rectangle, sample
-from rollover.spec.vehicle import RigidBody, Striker, Vehicle, Wheel, carried
+from rollover.spec.vehicle import RigidBody, Striker, Vehicle, Wheel, carried, hubs
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ POINTS_IN_ELEMENT = 0.8  # contact points are never further apart than this shar
 def bodies_of(
     vehicle: Vehicle | RigidBody | Striker, elements: Elements, effects: Mapping[str, Any] | None = None
 ) -> tuple[Body, ...]:
-    """Bodies with their contact points: striker, perhaps in two; or chassis, front axle, ROPS as far as there are any.
+    """Bodies with their contact points: striker, perhaps in two; or chassis and the vehicle's other parts.
 
     Points stand for areas, elements keep the ruts: an element without a point would be a gap under the body.
     """
@@ -78,7 +78,7 @@ def bodies_of(
         return [
             (disc.name, patch)
             for wheel in vehicle.wheels
-            if wheel.carrier == carrier
+            if wheel.hub == carrier and wheel.tyre.lying_stiffness is None  # else it bears on its own springs
             for disc in side_walls(wheel)
             for patch in sample(disc, spacing)
         ]
@@ -100,7 +100,11 @@ def bodies_of(
                 inertia = carried(vehicle, "rops")
             extra = loads("rops") if name == "rops" else []
             found.append(Body(name=name, inertia=inertia, surfaces=tuple(sampled(members) + extra)))
-    if isinstance(vehicle, Vehicle) and vehicle.occupant is not None:
+    if vehicle.trailer is not None:
+        surfaces = tuple(sampled(vehicle.trailer.outline) + loads("trailer") + walls("trailer"))
+        found.append(Body(name="trailer", inertia=carried(vehicle, "trailer"), surfaces=surfaces))
+    found += [Body(name=n, inertia=i, surfaces=tuple(walls(n))) for n, i in hubs(vehicle).items()]
+    if vehicle.occupant is not None:
         outlines = vehicle.occupant.outlines
         for name, inertia in vehicle.occupant.parts.items():
             surfaces = tuple(sampled((outlines[name],)))

@@ -11,8 +11,9 @@ from scipy.optimize import brentq
 
 from rollover.dynamics.bodies import Body
 from rollover.dynamics.posture import AXLE, PARTS, PITCH, ROLL, SLIDE, SWINGS, WITH_CHASSIS, YAW, move, put
-from rollover.kernels.forces import generalised_forces, tyre_point
+from rollover.kernels.forces import generalised_forces
 from rollover.kernels.jacobian import stiffness
+from rollover.kernels.links import JOINT, L_B, L_HIGH, L_LOW
 from rollover.kernels.step import stand
 from rollover.kernels.tables import (
     E_DEPTH_NOW,
@@ -30,9 +31,11 @@ from rollover.kernels.tables import (
     Tables,
     handle,
 )
+from rollover.kernels.tyres import tyre_point
 from rollover.spec.frames import from_angles
 
 Array = NDArray[np.float64]
+OWN = ("rops", "trailer", "hub_")
 TOLERANCE = 1e-7  # of forces and moments over the weight
 FREE = 1.0  # m or rad: a play that no part of a ROPS leaves
 BEYOND, STEP = math.radians(15.0), math.radians(1.0)  # of the inward search: from past the stiff balance, in degrees
@@ -52,7 +55,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 class Equilibrium:
-    """Few coordinates u: height, roll, pitch, axle angle, slide (2), yaw; shift (3) and tilt (3) of each ROPS body.
+    """Few coordinates u: height, roll, pitch, axle angle, slide (2), yaw; shift (3) and tilt (3) of each sprung body.
 
     Height is along the surface's normal, slide along it; roll, pitch and yaw turn about the vehicle's origin. The
     residuals are the virtual work of all forces for each coordinate, over the weight. The tyres' stick springs hold
@@ -70,7 +73,7 @@ class Equilibrium:
         n = t.plane[:3]
         x = np.array([n[2], 0.0, -n[0]]) / math.hypot(n[0], n[2])
         self.place = np.array([n, x, _cross(n, x), base])
-        frames = [b.name for b in bodies if b.name.startswith("rops")]
+        frames = [b.name for b in bodies if b.name.startswith(OWN)]  # bodies that springs hold
         self.size = PARTS + 6 * len(frames)
         begins = {name: PARTS + 6 * i for i, name in enumerate(frames)} | {"front_axle": SWINGS}
         self.part = np.array([begins.get(b.name, WITH_CHASSIS) for b in bodies], dtype=np.int64)
@@ -87,6 +90,7 @@ class Equilibrium:
         """Start of a search: rolled against the surface, pitched so that both axles touch, pressed in by the weight."""
         u = np.zeros(self.size)
         u[ROLL], u[AXLE] = self.level[0] + roll, axle
+        self._upright(u, roll)
         centres = [self.bodies[int(b)].centre[0] for b in self.t.wheel_i] + self.t.wheel_f[:, 0]
         front = centres > 0.5 * (centres.min() + centres.max())
 
@@ -105,6 +109,14 @@ class Equilibrium:
             deepest = float(depths(0.0).max())
         u[0] += deepest - self.scale / float(self.t.wheel_f[:, W_KZ].sum())
         return u
+
+    def _upright(self, u: Array, roll: float) -> None:
+        """Turn a trailer back on its hitch by as much as the vehicle is rolled, and as far as it turns."""
+        for (kind, b, *_), f in zip(self.t.link_i, self.t.link_f, strict=True):
+            if kind == JOINT and self.bodies[b].name == "trailer":
+                at, tilt = int(self.part[b]), min(max(-roll, f[L_LOW]), f[L_HIGH])
+                hitch = f[L_B : L_B + 3]
+                u[at : at + 3], u[at + 3] = hitch - from_angles(tilt, 0.0, 0.0) @ hitch, tilt
 
     def placed(self, u: Array) -> tuple[Array, Array]:
         """Generalised coordinates (6 nb,) of all bodies, and their velocities (size, 6 nb) for a unit rate of each u.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ground.kernel import CELL, LINE_Z, ROW, SINKAGE
 from rollover.dynamics import occupant
 from rollover.dynamics.bodies import Body
+from rollover.dynamics.links import link_channels
 from rollover.dynamics.prescribed import ground_acceleration, quantity, steered_kinetic
 from rollover.inputs import Shake
 from rollover.kernels import tables as c
@@ -87,7 +88,7 @@ class States:
     flags: NDArray[np.int64]
     footprint: Array
     prescribed: Array  # (n, ni) what the inputs were
-    links: Array  # (n, no) of an occupant, see rollover.dynamics.occupant
+    links: Array  # (n, no) of an occupant, a hitch and struts, see rollover.dynamics.links
     device: Array  # (n, OUT_COLUMNS), or (n, 0) without a test stand
 
 
@@ -156,8 +157,9 @@ def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> 
     if len(t.device_i):
         ledger["device"] = s.work[:, c.DEVICE]
         ledger["lashing"] = s.work[:, c.LASHING]
-    if len(t.link_i):
-        ledger["occupant"] = s.work[:, c.OCCUPANT]
+    for name, account in (("occupant", c.OCCUPANT), ("hitch", c.HITCH), ("suspension", c.SUSPENSION)):
+        if (t.link_i[:, 4] == account).any():
+            ledger[name] = s.work[:, account]
     if len(t.input_i):
         ledger["input"] = s.work[:, c.INPUT]
     total = np.sum(list(ledger.values()), axis=0)
@@ -205,6 +207,8 @@ def channels(scenario: Scenario, time: Array, s: States, t: Tables, bodies: tupl
                 found["axle/front/impulse"] = s.axle[:, 1]
     if isinstance(vehicle, Vehicle) and vehicle.occupant is not None:
         found |= occupant.channels(vehicle.occupant, s.links, s.q, s.qdd, s.resultant, row)
+    if isinstance(vehicle, Vehicle):
+        found |= link_channels(vehicle, s.links, s.q, bodies, row)
     for k, one in enumerate(scenario.inputs):
         found[f"input/{one.name}/{quantity(one)}"] = s.prescribed[:, k]
     for k, name in enumerate(("force", "deflection", "energy") if s.device.size else ()):

@@ -8,9 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.dynamics.bodies import Body
-from rollover.kernels import occupant as k
-from rollover.kernels.tables import R_NORMAL, R_TANGENT
+from rollover.kernels import links as k
+from rollover.kernels.tables import OCCUPANT, R_NORMAL, R_TANGENT
 from rollover.scenario import Scenario
 from rollover.spec.frames import matrices
 from rollover.spec.occupant import PARTS, Occupant, pairs
@@ -20,40 +19,32 @@ from rollover.spec.vehicle import Vehicle
 Array = NDArray[np.float64]
 Row = tuple[list[int], list[float]]
 Point = tuple[float, float, float]
+About = Callable[[str, Point], list[float]]
 
 
-def link_rows(
-    scenario: Scenario, bodies: tuple[Body, ...], row: dict[str, int]
-) -> tuple[NDArray[np.int64], Array, Array]:
-    """Rows of `link_i` and `link_f`, and the empty `link_out`: contact force (3) of each part, straps, joints (6)."""
-    vehicle = scenario.vehicle
-    if not isinstance(vehicle, Vehicle) or vehicle.occupant is None:
-        return np.zeros((0, 4), dtype=np.int64), np.zeros((0, k.LINK_COLUMNS)), np.zeros(0)
+def occupant_rows(scenario: Scenario, vehicle: Vehicle, row: dict[str, int], about: About) -> tuple[list[Row], int]:
+    """Rows of `link_i` and `link_f`, and the length of `link_out`: contact force (3) of each part, straps, joints (6).
+
+    `about` gives a point in vehicle axes about a body's centre of mass.
+    """
+    if vehicle.occupant is None:
+        return [], 0
     occupant, out = vehicle.occupant, 3 * len(PARTS)
     rows: list[Row] = []
-
-    def about(body: str, point: Point) -> list[float]:
-        return [float(c) for c in np.array(point) - bodies[row[body]].centre]
 
     if (belt := occupant.belt) is not None:
         for _, anchor, hip in occupant.straps:
             length = math.dist(anchor, hip) + belt.slack
             ends = [*about("occupant_pelvis", hip), *about("chassis", anchor)]
             numbers = [*ends, belt.stiffness, belt.damping, length]
-            rows.append(([k.STRAP, row["occupant_pelvis"], row["chassis"], out], numbers))
+            rows.append(([k.STRAP, row["occupant_pelvis"], row["chassis"], out, OCCUPANT], numbers))
             out += 1
     for _, lower, upper, at, joint in occupant.joints:
         under, above = f"occupant_{lower}", f"occupant_{upper}"
-        numbers = [*about(above, at), *about(under, at), occupant.joint_stiffness, occupant.joint_damping]
-        numbers += [*joint.stiffness, *joint.damping]
-        numbers += [math.radians(angle) for angle in (*joint.low_deg, *joint.high_deg)]
-        rows.append(([k.JOINT, row[above], row[under], out], [*numbers, joint.stop_stiffness]))
+        held = [occupant.joint_stiffness, occupant.joint_damping, *joint.row]
+        rows.append(([k.JOINT, row[above], row[under], out, OCCUPANT], [*about(above, at), *about(under, at), *held]))
         out += 6
-    rows += _touching(scenario, vehicle, occupant, row, about)
-    f = np.zeros((len(rows), k.LINK_COLUMNS))
-    for i, (_, numbers) in enumerate(rows):
-        f[i, : len(numbers)] = numbers
-    return np.array([whole for whole, _ in rows], dtype=np.int64), f, np.zeros(out)
+    return rows + _touching(scenario, vehicle, occupant, row, about), out
 
 
 def _touching(
@@ -61,7 +52,7 @@ def _touching(
     vehicle: Vehicle,
     occupant: Occupant,
     row: dict[str, int],
-    about: Callable[[str, Point], list[float]],
+    about: About,
 ) -> list[Row]:
     """Spheres against boxes and tubes; the hips stand in the cushion by their weight over its stiffness."""
     sag = occupant.mass * scenario.gravity / occupant.cushion_stiffness
@@ -76,7 +67,7 @@ def _touching(
             stiffness, last = 0.25 * occupant.cushion_stiffness, (*last[:2], last[2] + sag)
         numbers = [*about(part, pair.middle), *about(pair.carrier, first), stiffness, occupant.contact_damping]
         numbers += [*about(pair.carrier, last), radius, occupant.friction]
-        found.append(([kind, row[part], row[pair.carrier], 3 * PARTS.index(pair.part)], numbers))
+        found.append(([kind, row[part], row[pair.carrier], 3 * PARTS.index(pair.part), OCCUPANT], numbers))
     return found
 
 

@@ -192,6 +192,8 @@ def _stood(
 def _why_not(scenario: Scenario, t: Tables, heading: float) -> tuple[str, str]:
     """Why a vehicle does not stand, and what lets it: by the support of a rigid one on the plane under its wheels."""
     assert isinstance(scenario.vehicle, Vehicle)
+    if scenario.vehicle.trailer is not None:
+        return "no static equilibrium with its trailer", "a gentler ground.surface, another heading, or 'drop'"
     x, y, z = (float(c) for c in t.plane[:3])  # the normal leans downhill
     least = closed_form(scenario.vehicle, math.pi - math.atan2(y, x) + heading).rigid
     slope = math.acos(min(z, 1.0))
@@ -201,6 +203,8 @@ def _why_not(scenario: Scenario, t: Tables, heading: float) -> tuple[str, str]:
     if least < slope:
         steep = f"ground of {math.degrees(slope):.3g} deg, which it turns over on from {math.degrees(least):.3g} deg"
         return steep, "a gentler ground.surface, another heading, or 'drop'"
+    if not is_flat(scenario.ground.surface):
+        return "no static equilibrium, as where a wheel stands on an edge", "another initiation.position, or 'drop'"
     return "no static equilibrium", "'drop' or 'tip-over'"
 
 

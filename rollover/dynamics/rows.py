@@ -28,7 +28,7 @@ def wheel_rows(wheels: tuple[Wheel, ...], bodies: tuple[Body, ...], row: dict[st
     wheel_f = np.zeros((len(wheels), c.WHEEL_COLUMNS))
     for w, wheel in enumerate(wheels):
         tyre = wheel.tyre
-        centre = np.array(wheel.centre) - bodies[row[wheel.carrier]].centre
+        centre = np.array(wheel.centre) - bodies[row[wheel.hub]].centre
         wheel_f[w] = [
             *centre,
             *(0.0, 1.0, 0.0),
@@ -42,6 +42,7 @@ def wheel_rows(wheels: tuple[Wheel, ...], bodies: tuple[Body, ...], row: dict[st
             float(wheel.rolls),
             math.inf if tyre.bottoming is None else tyre.bottoming * tyre.radius,
             tyre.bottoming_stiffness,
+            0.0 if tyre.lying_stiffness is None else tyre.lying_stiffness / tyre.lateral_stiffness,
         ]
     return wheel_f
 

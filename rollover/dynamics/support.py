@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.spec.inertia import combined
-from rollover.spec.vehicle import Vehicle, carried, laden
+from rollover.spec.vehicle import Vehicle, alone, carried, laden
 
 Array = NDArray[np.float64]
 
@@ -35,8 +35,9 @@ def closed_form(vehicle: Vehicle, heading: float, *, outer: bool = True) -> Clos
     """Slopes for a heading (rad), with tyres that bear at their outer edges or in their middle.
 
     Across the slope tan b = s (1 - a/L)/(h - h_p a/L) on the pivot and [s_r (1 - a/L) + s_f a/L]/h at the stop, with a
-    and h of the mass that each carries: of the vehicle without its front axle, and of the whole.
+    and h of the mass that each carries: of the vehicle without its front axle, and of the whole. Without a trailer.
     """
+    vehicle = alone(vehicle)
     feet = {w.name: _foot(w.centre, w.tyre.width if outer else 0.0) for w in vehicle.wheels}
     rigid = turning_slope(list(feet.values()), np.array(laden(vehicle).centre_of_mass), heading)
     if vehicle.front_axle is None:

@@ -28,8 +28,7 @@ from ground.kernel import (
     loading_force,
 )
 from ground.law import REFERENCE_AREA
-from rollover.kernels.forces import TYRE_RELAXATION, tyre_stiffness
-from rollover.kernels.occupant import stiffen_links
+from rollover.kernels.links import stiffen_links
 from rollover.kernels.tables import (
     A_C,
     A_K,
@@ -65,6 +64,7 @@ from rollover.kernels.tables import (
     Z,
 )
 from rollover.kernels.terms import stiffen_terms
+from rollover.kernels.tyres import TYRE_RELAXATION, tyre_stiffness
 from rollover.kernels.vectors import direction_row, place, to_body, velocity
 
 

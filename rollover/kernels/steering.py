@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from ground.compiled import compiled
-from rollover.kernels.forces import keep_tyres, try_wheels
 from rollover.kernels.inputs import I_KIND, STEERING, V_NOW, V_TURNED
 from rollover.kernels.tables import E_ENERGY, E_ENERGY_NOW, INPUT, OMEGA, P_INERTIA, P_RATE_NOW, P_STEERED, TYRE, W_AXIS
+from rollover.kernels.tyres import keep_tyres, try_wheels
 
 
 @compiled

@@ -17,10 +17,10 @@ from ground.kernel import (
 from rollover.kernels.applied_forces import A_TANGENT, NOW, finish_applied
 from rollover.kernels.contact_state import note_event, touch
 from rollover.kernels.elements import finish_elements, settle
-from rollover.kernels.forces import along_axle, generalised_forces, keep_tyres, read_poses
+from rollover.kernels.forces import generalised_forces, read_poses
 from rollover.kernels.impact import strike_stop
 from rollover.kernels.inputs import finish_inputs
-from rollover.kernels.occupant import finish_links
+from rollover.kernels.links import finish_links
 from rollover.kernels.ploughing import plough
 from rollover.kernels.stand_devices import finish_devices, keep_poses
 from rollover.kernels.steering import steer
@@ -35,6 +35,8 @@ from rollover.kernels.tables import (
     COLLISION,
     DEVICE,
     E_ANCHOR,
+    E_COSINE,
+    E_COSINE_NOW,
     E_DAMPING,
     E_DAMPING_NOW,
     E_DEPTH,
@@ -44,6 +46,8 @@ from rollover.kernels.tables import (
     E_FORCE,
     E_FORCE_NOW,
     E_FRICTION_NOW,
+    E_INWARD,
+    E_INWARD_NOW,
     E_NORMAL_NOW,
     E_PLACE,
     E_POINT,
@@ -77,6 +81,7 @@ from rollover.kernels.tables import (
     WHEEL_ON,
 )
 from rollover.kernels.terms import finish_terms
+from rollover.kernels.tyres import along_axle, keep_tyres
 from rollover.kernels.vectors import add_force, place, to_world
 from rollover.kernels.wheel_spin import finish_spins, keep_spins, tread_motion, turn_by_friction
 
@@ -128,7 +133,10 @@ def finish_wheels(t: Any) -> None:
     for w in range(t.wheel_i.size):
         g = t.wheel_memory[w]
         t.work[TYRE] += g[E_ENERGY_NOW] - g[E_ENERGY]
-        t.work[TYRE] += 0.5 * (g[E_DAMPING] + g[E_DAMPING_NOW]) * (g[E_DEPTH_NOW] - g[E_DEPTH])
+        # way of the pressure's centre, which of a tyre that lies flat is not the lowest point
+        inside = 0.5 * (g[E_INWARD] + g[E_INWARD_NOW]) * (g[E_COSINE_NOW] - g[E_COSINE])
+        way = g[E_DEPTH_NOW] - g[E_DEPTH] - inside
+        t.work[TYRE] += 0.5 * (g[E_DAMPING] + g[E_DAMPING_NOW]) * way
         grip(t, w)
         hold(g)  # the tread's lowest point moves over the crown: friction takes hold of the new one
         if (g[E_FORCE] > 0.0) != (g[E_FORCE_NOW] > 0.0):

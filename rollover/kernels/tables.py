@@ -17,8 +17,8 @@ X, ROT, VEL, OMEGA, ACC, ALPHA, POSE_COLUMNS = 0, 3, 12, 15, 18, 21, 24
 
 # columns of wheel_f
 W_CENTRE, W_AXIS, W_RADIUS, W_HALF, W_CROWN, W_KZ, W_KY, W_C, W_MU, W_ROLLS = 0, 3, 6, 7, 8, 9, 10, 11, 12, 13
-# deflection at which the rim bottoms and the stiffness that it adds
-W_BOTTOM, W_KB, WHEEL_COLUMNS = 14, 15, 16
+# deflection at which the rim bottoms and the stiffness that it adds; stiffness flat on the side over k_y, 0: rigid
+W_BOTTOM, W_KB, W_SIDE, WHEEL_COLUMNS = 14, 15, 16, 17
 # columns of wheel_memory: anchor of the stick spring in the carrier's axes, its place and shear; then what was found
 # at the start of the step (depth, normal force, damping force, elastic energy, friction) and what is found now
 E_ANCHOR, E_PLACE, E_SHEAR, E_DEPTH, E_FORCE, E_DAMPING, E_ENERGY, E_FRICTION = 0, 3, 6, 9, 10, 11, 12, 13
@@ -26,8 +26,9 @@ E_DEPTH_NOW, E_FORCE_NOW, E_DAMPING_NOW, E_ENERGY_NOW, E_FRICTION_NOW = 16, 17, 
 # way of the anchor since the start of the step and what of it strains the spring; the tread's lowest point in the
 # carrier's axes and in the world
 E_MOVED, E_SLIP, E_POINT, E_WHERE = 23, 26, 29, 32
-# normal of the ground under the tread at the start of the step and now
-E_NORMAL, E_NORMAL_NOW, EDGE_COLUMNS = 35, 38, 41
+# normal of the ground under the tread at the start of the step and now; how far the pressure's centre lies within the
+# ring and cosine of the camber, at the start of the step and now
+E_NORMAL, E_NORMAL_NOW, E_INWARD, E_COSINE, E_INWARD_NOW, E_COSINE_NOW, EDGE_COLUMNS = 35, 38, 41, 42, 43, 44, 45
 
 # columns of spin_f: inertia about the axle, limit of the brake's torque, whether the drive turns this wheel,
 # whether the brake holds it against the ground instead of its carrier, whether it has a brake, whether it is steered
@@ -74,7 +75,7 @@ SLOTS, ACTIVE, EVENTS, OUTSIDE, FLAGS_NOW, COUNTS = 0, 1, 2, 3, 4, 5
 
 # places in work (J taken from the vehicle since the start)
 SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, DEVICE, LASHING = 0, 1, 2, 3, 4, 5, 6, 7
-EXTRA_WORK, DRIVE, INPUT, OCCUPANT, WORKS = 8, 9, 10, 11, 12
+EXTRA_WORK, DRIVE, INPUT, OCCUPANT, HITCH, SUSPENSION, WORKS = 8, 9, 10, 11, 12, 13, 14
 
 # columns of trial: what the last evaluation found for each active element
 Z, ZDOT, FN, FT, MOVED, TRIAL_COLUMNS = 0, 1, 2, 3, 6, 9
@@ -178,11 +179,11 @@ class Tables(NamedTuple):
     input_memory: Any  # (ni, INPUT_MEMORY)
     input_q: Any  # (2, 6 nb) generalised forces now, then at the start of the step
     pieces: Any  # (np, PIECE_COLUMNS) of all signals
-    # an occupant, see rollover.kernels.occupant; nl links, none without
-    link_i: Any  # (nl, 4) kind, body b, body a, first place in link_out
+    # what holds an occupant, a trailer, a sprung wheel, see rollover.kernels.links; nl links, none without
+    link_i: Any  # (nl, 5) kind, body b, body a, first place in link_out, account in work
     link_f: Any  # (nl, LINK_COLUMNS)
     link_memory: Any  # (nl, LINK_MEMORY)
-    link_out: Any  # (no,) what is recorded: contact force on each part (world), straps, joints
+    link_out: Any  # (no,) what is recorded: contact force on each part (world), straps, joints; hitch, struts
 
 
 @register

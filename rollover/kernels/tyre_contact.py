@@ -12,7 +12,9 @@ the slope around the wheel:
     L = (h(x, y) - z) / (sqrt(1 + |g|^2) cos(camber)),   g that slope, (x, y, z) on the tread,
 
 which is exact on a plane, and for an upright disc at a step. Nothing has to be searched for, so that a disc that lies
-against a steep face has one depth and no other; there the side wall bears, on the elements.
+against a steep face has one depth and no other; there the side wall bears, on the elements. A tyre whose side wall
+gives way bears on its shoulder's ring instead, the more the flatter it lies: on a plane through the ground's heights at
+four places of that ring.
 
 The disc is the deepest of `SLICES` across the crowned tread, the maximum rounded by `SOFT`, which is also how far the
 depth may differ from the plane's own law there. Limits: the profile is sampled at `NODES` places over the diameter; no
@@ -29,13 +31,14 @@ import numpy as np
 
 from ground.compiled import compiled, leaf
 from ground.relief import height_and_gradient, highest
-from rollover.kernels.tables import W_AXIS, W_CENTRE, W_CROWN, W_HALF, W_RADIUS
+from rollover.kernels.tables import W_AXIS, W_CENTRE, W_CROWN, W_HALF, W_RADIUS, W_SIDE
 from rollover.kernels.vectors import add_force, cross, place, spin, to_body, to_world, velocity
 
 NODES = 49
 SLICES = 5
 SOFT = 0.001  # m: slices whose depths differ by less share the force
 FAR = 0.2  # share of the radius: ground further below the tread is not looked at closely
+FLAT = 0.12  # cos^2 of the camber, 70 degrees, from which a tyre begins to lie on its side
 
 # places in what `cut` finds: depth, across the ground around the wheel, and its change with the hub's place and with
 # the axle's direction; sine of the camber and its change with the hub's x and y; normal of the ground around the wheel,
@@ -44,6 +47,16 @@ C_DEPTH, C_BY_HUB, C_BY_AXLE, C_LEAN, C_LEAN_X, C_LEAN_Y, C_AROUND, C_NORMAL, CU
 # places in what `slice_through` finds: depth in the disc's plane; its change with the ground's height as sums over the
 # tread of the direction (h_x, h_y, -1), of that times the place forward, times the place up, and of the height itself
 S_DEPTH, S_PLACE, S_FORWARD, S_UP, S_HEIGHT, SLICED = 0, 1, 4, 7, 10, 11
+
+
+@leaf
+def lying(lean: float) -> Any:
+    """Share of the tread's springs that is left when a tyre lies down, 1 up to a camber of 70 degrees, and its slope.
+
+    The slope is that over lean^2.
+    """
+    s2 = min(lean * lean, 1.0)
+    return ((1.0 - s2) / FLAT, -1.0 / FLAT) if 1.0 - s2 < FLAT else (1.0, 0.0)
 
 
 @leaf
@@ -96,7 +109,7 @@ def depth_of(R: float, area: float) -> Any:
 
 @leaf
 def slope_around(t: Any, hub: Any, reach: float, g: Any) -> None:
-    """The ground's slope around the wheel (2,) and its change with the hub's x, then y, into `g` (6,).
+    """The ground's slope around the wheel (2,), its change with the hub's x, y, its height and slope, into `g` (9,).
 
     That of chords of the wheel's diameter through the hub, so that it does not jump at an edge.
     """
@@ -108,6 +121,7 @@ def slope_around(t: Any, hub: Any, reach: float, g: Any) -> None:
     g[0], g[1] = 0.5 * (a - b) / reach, 0.5 * (c - d) / reach
     g[2], g[3] = 0.5 * (ax - bx) / reach, 0.5 * (cx - dx) / reach
     g[4], g[5] = 0.5 * (ay - by) / reach, 0.5 * (cy - dy) / reach
+    g[6], g[7], g[8] = 0.25 * (a + b + c + d), 0.25 * (ax + bx + cx + dx), 0.25 * (ay + by + cy + dy)
 
 
 @leaf
@@ -161,7 +175,7 @@ def cut(t: Any, row: Any, wheel: Any, found: Any) -> None:
     hub = place(row, wheel[W_CENTRE], wheel[W_CENTRE + 1], wheel[W_CENTRE + 2])
     e, n, forward, up = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     e[0], e[1], e[2] = to_world(row, wheel[W_AXIS], wheel[W_AXIS + 1], wheel[W_AXIS + 2])
-    g = np.empty(6)
+    g = np.empty(9)
     slope_around(t, hub, wheel[W_RADIUS], g)
     size = math.sqrt(1.0 + g[0] * g[0] + g[1] * g[1])
     n[0], n[1], n[2] = -g[0] / size, -g[1] / size, 1.0 / size
@@ -224,9 +238,39 @@ def cut(t: Any, row: Any, wheel: Any, found: Any) -> None:
     found[C_BY_HUB] = whole[S_PLACE] + by_gx * g[2] + by_gy * g[3]
     found[C_BY_HUB + 1] = whole[S_PLACE + 1] + by_gx * g[4] + by_gy * g[5]
     found[C_BY_HUB + 2] = whole[S_PLACE + 2]
+    if wheel[W_SIDE] > 0.0:
+        lay(wheel, hub, g, found)
     strength = pressing(found)
     for k in range(3):
         found[C_NORMAL + k] = -found[C_BY_HUB + k] / strength
+
+
+@leaf
+def lay(wheel: Any, hub: Any, g: Any, found: Any) -> None:
+    """Mix the depth of the shoulder's ring in the plane around the wheel into that of the tread, as the tyre lies down.
+
+    d = D - y lean + R cos(camber), D the hub's depth, y the shoulder's place on the axle, R its radius.
+    """
+    lean = found[C_LEAN]
+    share, fall = lying(lean)
+    if share >= 1.0:
+        return
+    cosine = math.sqrt(max(1.0 - lean * lean, 1e-12))
+    size = math.sqrt(1.0 + g[0] * g[0] + g[1] * g[1])
+    y, radius, over = -math.copysign(wheel[W_HALF], lean), wheel[W_RADIUS] - max(wheel[W_CROWN], 1e-6), g[6] - hub[2]
+    depth, by_lean = over / size - y * lean + radius * cosine, -y - radius * lean / cosine
+    turning = 2.0 * fall * lean * (found[C_DEPTH] - depth)
+    ring = (
+        g[7] / size - over * (g[0] * g[2] + g[1] * g[3]) / size**3 + by_lean * found[C_LEAN_X],
+        g[8] / size - over * (g[0] * g[4] + g[1] * g[5]) / size**3 + by_lean * found[C_LEAN_Y],
+        -1.0 / size,
+    )
+    leans = (found[C_LEAN_X], found[C_LEAN_Y], 0.0)
+    for k in range(3):
+        found[C_BY_HUB + k] = share * found[C_BY_HUB + k] + (1.0 - share) * ring[k] + turning * leans[k]
+        along = ((1.0 - share) * by_lean + turning) * found[C_AROUND + k]
+        found[C_BY_AXLE + k] = share * found[C_BY_AXLE + k] + along
+    found[C_DEPTH] = share * found[C_DEPTH] + (1.0 - share) * depth
 
 
 @leaf
@@ -245,6 +289,16 @@ def closing_rate(row: Any, c: Any, e: Any, found: Any) -> float:
     for k in range(3):
         rate += found[C_BY_HUB + k] * v[k] + found[C_BY_AXLE + k] * turning[k]
     return rate
+
+
+@leaf
+def leaning_rate(row: Any, c: Any, e: Any, found: Any) -> float:
+    """Rate of the camber's sine on uneven ground, 1/s; e is the axle."""
+    v = velocity(row, c[W_CENTRE], c[W_CENTRE + 1], c[W_CENTRE + 2])
+    o = spin(row)
+    x, y, z = cross(o[0], o[1], o[2], e[0], e[1], e[2])
+    rate = found[C_LEAN_X] * v[0] + found[C_LEAN_Y] * v[1]
+    return rate + found[C_AROUND] * x + found[C_AROUND + 1] * y + found[C_AROUND + 2] * z  # type: ignore[no-any-return]
 
 
 @compiled

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from rollover.spec.connector import Connector
 from rollover.spec.estimates import turning_inertia
+from rollover.spec.inertia import MassProperties
 from rollover.spec.mechanism import Joint, free_motions, in_words
-from rollover.spec.vehicle import Carrier, Vehicle, carried
+from rollover.spec.vehicle import Carrier, Vehicle, carried, hubs
 
 RIGID = 1e6  # of the stiffest tyre: what stands for the pivot, whose root is a thousandth of what round-off would blur
 
@@ -36,6 +37,20 @@ def check_standing(vehicle: Vehicle) -> None:
         )
         parts["front_axle"] = carried(vehicle, "front_axle")
         joints.append(Joint(path="front_axle", below="chassis", above="front_axle", connector=pivot))
+    if vehicle.trailer is not None:
+        hitch = vehicle.trailer.hitch
+        stiff = RIGID * max(max(j.connector.stiffness) for j in joints)
+        # where a turn is free up to its stop, the stop holds what the wheels do not
+        turns = hitch.turns.stop_stiffness
+        ball = Connector(
+            name="hitch",
+            position=hitch.position,
+            stiffness=(stiff, stiff, stiff),
+            damping=(0.0, 0.0, 0.0),
+            rotational_stiffness=(turns, turns, turns),
+        )
+        parts["trailer"] = carried(vehicle, "trailer")
+        joints.append(Joint(path="trailer.hitch", below="chassis", above="trailer", connector=ball))
     if motions := free_motions(parts, joints, gravity=0.0):
         free = motions[0]
         names = [w.name for w in vehicle.wheels if w.carrier in free.parts]
@@ -47,14 +62,15 @@ def check_standing(vehicle: Vehicle) -> None:
 
 def check_turning(vehicle: Vehicle) -> None:
     """Raise ``ValueError`` for wheels that turn with more inertia than the body that they are part of."""
-    carriers: tuple[Carrier, ...] = ("front_axle", "chassis")
-    for carrier in carriers:
-        wheels = [w for w in vehicle.wheels if w.carrier == carrier]
-        if not wheels:
-            continue
-        turning, most = sum(turning_inertia(vehicle, w) for w in wheels), carried(vehicle, carrier).inertia[1]
+    of: dict[str, MassProperties] = {**hubs(vehicle)}
+    carriers: tuple[Carrier, ...] = ("front_axle", "chassis", "trailer")
+    of |= {carrier: carried(vehicle, carrier) for carrier in carriers if any(w.hub == carrier for w in vehicle.wheels)}
+    named = {"front_axle": "their axle", "chassis": "the chassis", "trailer": "the trailer"}
+    for carrier, whole in of.items():
+        wheels = [w for w in vehicle.wheels if w.hub == carrier]
+        turning, most = sum(turning_inertia(vehicle, w) for w in wheels), whole.inertia[1]
         if turning >= most:
-            body = "their axle" if carrier == "front_axle" else "the chassis"
+            body = named.get(carrier, f"the hub of {wheels[0].name}")
             unstated = [w.name for w in wheels if w.inertia is None]
             by_size = ", by the size of their tyres" if unstated else ""
             cure = f"; state vehicle.wheels.*.inertia of {', '.join(unstated)}" if unstated else ""

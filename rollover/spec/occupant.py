@@ -41,6 +41,12 @@ class BodyJoint:
     high_deg: Annotated[Point, Quantity("deg", "largest angles; about y is a bow", least=0, most=120)]
     stop_stiffness: Annotated[float, Quantity("N m/rad", "added beyond the range", least=0)] = 2000.0
 
+    @property
+    def row(self) -> tuple[float, ...]:
+        """Stiffness (3), damping (3), least (3) and largest angles (3, rad), stop: as the kernels take them."""
+        angles = [math.radians(angle) for angle in (*self.low_deg, *self.high_deg)]
+        return (*self.stiffness, *self.damping, *angles, self.stop_stiffness)
+
 
 @parameters
 class LapBelt:

@@ -17,13 +17,17 @@ from rollover.spec.occupant import Occupant, check_room
 from rollover.spec.provenance import Provenance
 from rollover.spec.rops import Rops
 from rollover.spec.shapes import Point, Shape
+from rollover.spec.suspension import Suspension
+from rollover.spec.trailer import Trailer
 
 
 @parameters
 class Tyre:
     """A crowned tread on radial and lateral springs in series, a dashpot, Coulomb friction; never pulls.
 
-    Section R - c (2y/w)^2; stiffness 1/k = cos^2(camber)/k_z + sin^2(camber)/k_y at its lowest point.
+    Section R - c (2y/w)^2; stiffness 1/k = cos^2(camber)/k_z + sin^2(camber)/k_y at its lowest point. Flat on its side
+    it is a ring of its shoulder's radius that yields on the rim by `lying_stiffness`; held evenly all round, pressed at
+    one place by F, a rigid ring of stiffness c shifts by F/c and tilts by 2 F/(c R) there, so that k_y = c/3.
     """
 
     radius: Annotated[float, Quantity("m", "unloaded, in the middle of the tread", above=0)]
@@ -35,11 +39,23 @@ class Tyre:
     vertical_stiffness: Annotated[float, Quantity("N/m", "k_z", above=0)]
     vertical_damping: Annotated[float, Quantity("N s/m", least=0)] = 0.0
     lateral_stiffness: Annotated[float, Quantity("N/m", "k_y, also of the stick spring", above=0)]
+    lying_stiffness: Annotated[
+        float | None,
+        Quantity("N/m", "of the tyre flat on its side, 3 k_y if held evenly; null: rigid side walls", above=0),
+    ] = None
     friction: Annotated[float, Quantity("1", "mu between tyre and ground", least=0, most=2)] = 0.8
     bottoming: Annotated[
         float | None, Quantity("1", "deflection at which the rim bottoms, as a share of the radius", above=0, most=1)
     ] = None
     bottoming_stiffness: Annotated[float, Quantity("N/m", "added to k_z once the rim bottoms", least=0)] = 0.0
+
+    def validate(self) -> None:
+        """Refuse a ring that yields more as a whole than where it is pressed at one place."""
+        if self.lying_stiffness is not None and self.lying_stiffness <= self.lateral_stiffness:
+            raise ValueError(
+                f"lying_stiffness: less than at one place of the tread, got {self.lying_stiffness:g} N/m; more than "
+                f"lateral_stiffness, {self.lateral_stiffness:g} N/m"
+            )
 
 
 @parameters
@@ -49,7 +65,10 @@ class Wheel:
     name: Annotated[str, Label("front_left, front_right, rear_left, rear_right")]
     centre: Annotated[Point, Quantity("m", "wheel centre, vehicle axes")]
     tyre: Tyre
-    carrier: Literal["chassis", "front_axle"] = "chassis"
+    carrier: Literal["chassis", "front_axle", "trailer"] = "chassis"
+    suspension: Annotated[Suspension | None, Later(), "of a wheel on the chassis; null: it is fixed to its carrier"] = (
+        None
+    )
     rolls: Annotated[
         bool, "turns freely and without inertia, else it is locked; 'driving' turns every wheel by its own inertia"
     ] = False
@@ -62,6 +81,11 @@ class Wheel:
             above=0,
         ),
     ] = None
+
+    @property
+    def hub(self) -> str:
+        """Name of the body that it stands on: its carrier, or its own where it is sprung."""
+        return self.carrier if self.suspension is None else f"hub_{self.name}"
 
 
 @parameters
@@ -85,7 +109,7 @@ class FrontAxle:
         return math.radians(self.swing_deg)
 
 
-Carrier = Literal["chassis", "front_axle", "rops"]
+Carrier = Literal["chassis", "front_axle", "rops", "trailer"]
 
 
 @parameters
@@ -133,6 +157,7 @@ class Vehicle:
     outline: Annotated[tuple[Shape, ...], "what of the chassis can touch the ground: bonnet, fenders, mass block"] = ()
     attached: Annotated[tuple[Attached, ...], "masses beyond the whole: ballast, implement, driver, tank"] = ()
     occupant: Annotated[Occupant | None, Later(), "who sits on it, as bodies of its own; null: nobody"] = None
+    trailer: Annotated[Trailer | None, Later(), "what is articulated behind it; null: nothing"] = None
     contact_spacing: Annotated[float, Quantity("m", "of the contact points on outlines and members", above=0)] = 0.03
     provenance: tuple[Provenance, ...] = ()
 
@@ -145,8 +170,14 @@ class Vehicle:
             raise ValueError(
                 "wheels: a wheel is carried by 'front_axle' but there is none; give front_axle or 'chassis'"
             )
+        for w in self.wheels:
+            if w.carrier == "trailer" and self.trailer is None:
+                raise ValueError("wheels: a wheel is carried by 'trailer' but there is none; give trailer or 'chassis'")
+            if w.suspension is not None and w.carrier != "chassis":
+                raise ValueError(f"wheels.{w.name}.suspension: got it on {w.carrier!r}; null, or carrier 'chassis'")
+        there = {"chassis": True, "front_axle": self.front_axle, "rops": self.rops, "trailer": self.trailer}
         for a in self.attached:
-            if (a.carried_by == "front_axle" and self.front_axle is None) or (a.carried_by == "rops" and not self.rops):
+            if there[a.carried_by] is None:
                 raise ValueError(f"attached.{a.name}.carried_by: there is none, got {a.carried_by!r}; 'chassis'")
         masses = [a.name for a in self.attached]
         if len(set(masses)) != len(masses):
@@ -157,7 +188,9 @@ class Vehicle:
 
     def on_axle(self, wheel: Wheel, axle: str) -> bool:
         """Whether a wheel belongs to the "front", the "rear" or "all" of the axles."""
-        xs = [w.centre[0] for w in self.wheels]
+        if wheel.carrier == "trailer":
+            return axle == "all"
+        xs = [w.centre[0] for w in self.wheels if w.carrier != "trailer"]
         is_front = wheel.carrier == "front_axle" or wheel.centre[0] > 0.5 * (min(xs) + max(xs)) + 1e-9
         return axle == "all" or is_front == (axle == "front")
 
@@ -191,6 +224,8 @@ class RigidBody:
     # a body is a chassis with nothing on it
     wheels: ClassVar[tuple[Wheel, ...]] = ()
     front_axle: ClassVar[None] = None
+    trailer: ClassVar[None] = None
+    occupant: ClassVar[None] = None
     rops: ClassVar[None] = None
     attached: ClassVar[tuple[Attached, ...]] = ()
 
@@ -201,7 +236,7 @@ class RigidBody:
 
 
 def chassis_of(vehicle: Vehicle | RigidBody) -> MassProperties:
-    """Mass properties of the chassis: the whole less front axle and ROPS, without attached masses.
+    """Mass properties of the chassis: the whole less front axle, ROPS and sprung wheels, without attached masses.
 
     Raises ``ValueError`` if the parts weigh more than the whole or leave an inertia that no body can have.
     """
@@ -211,22 +246,28 @@ def chassis_of(vehicle: Vehicle | RigidBody) -> MassProperties:
     parts = [] if vehicle.front_axle is None else [vehicle.front_axle.body]
     if vehicle.rops is not None:
         parts += [body for body, _ in vehicle.rops.parts.values()]
+    parts += hubs(vehicle).values()
     heavy = sum(p.mass for p in parts)
     if whole.mass <= heavy:
         raise ValueError(
-            f"whole.mass: front axle and ROPS weigh more than the vehicle, got {whole.mass:g} kg; "
+            f"whole.mass: front axle, ROPS and sprung wheels weigh more than the vehicle, got {whole.mass:g} kg; "
             f"greater than {heavy:g} kg is allowed"
         )
     try:
         return combined([whole], less=parts)
     except ValueError as e:
-        raise ValueError(f"whole.inertia: leaves the chassis, without front axle and ROPS, an impossible {e}") from None
+        raise ValueError(
+            f"whole.inertia: leaves the chassis, without front axle, ROPS and hubs, an impossible {e}"
+        ) from None
 
 
 def carried(vehicle: Vehicle | RigidBody, carrier: Carrier) -> MassProperties:
     """Mass properties of a body of the vehicle with the masses that it carries."""
     if carrier == "chassis":
         own = chassis_of(vehicle)
+    elif carrier == "trailer":
+        assert vehicle.trailer is not None
+        own = vehicle.trailer.body
     else:
         part = vehicle.front_axle if carrier == "front_axle" else vehicle.rops
         assert part is not None
@@ -240,7 +281,30 @@ def laden(vehicle: Vehicle | RigidBody) -> MassProperties:
     extra = [a.body for a in vehicle.attached]
     if isinstance(vehicle, Vehicle) and vehicle.occupant is not None:
         extra += vehicle.occupant.parts.values()
+    if vehicle.trailer is not None:
+        extra.append(vehicle.trailer.body)
     return combined([vehicle.whole, *extra]) if extra else vehicle.whole
+
+
+def hubs(vehicle: Vehicle | RigidBody) -> dict[str, MassProperties]:
+    """Mass properties of what moves with each sprung wheel, by the name of its body."""
+    return {
+        w.hub: w.suspension.hub(w.centre, w.tyre.radius, w.tyre.width)
+        for w in vehicle.wheels
+        if w.suspension is not None
+    }
+
+
+def alone(vehicle: Vehicle) -> Vehicle:
+    """The same vehicle without its trailer."""
+    if vehicle.trailer is None:
+        return vehicle
+    return replace(
+        vehicle,
+        trailer=None,
+        wheels=tuple(w for w in vehicle.wheels if w.carrier != "trailer"),
+        attached=tuple(a for a in vehicle.attached if a.carried_by != "trailer"),
+    )
 
 
 def seated_still(vehicle: Vehicle) -> Vehicle:
@@ -260,7 +324,7 @@ def pitch_inertia(vehicle: Vehicle) -> tuple[float, float] | None:
     The second is where the two formulae of the pendulum test of OECD Code 3 for a rear impact agree, H = 2.165e-8 M L^2
     and H = 5.73e-2 I (mm); a tractor far from it has an unusual pitch inertia, or a wrong one.
     """
-    sides = [w for w in vehicle.wheels if w.carrier == "chassis"], [w for w in vehicle.wheels if w.carrier != "chassis"]
+    sides = [[w for w in vehicle.wheels if w.carrier == carrier] for carrier in ("chassis", "front_axle")]
     if not all(sides):
         return None
     rear, front = sides[0][0].centre, sides[1][0].centre

@@ -2,9 +2,10 @@
 
 `--narrow`: ten narrow tractors with a front-mounted ROPS, which the calculation is made for: the vineyard tractor with
 other frames, tracks and centres of gravity. Else each shipped vehicle on wheels. It tips over on a slope of 1 : 1.5; it
-rolls on if its roll passes half a turn. Prints both verdicts, the roll (deg) at the end, and the ledger (%). Where the
-calculation does not cover a vehicle it says why: a ROPS that is folded down lands after the bonnet, which the
-regulation's order of blows does not know; the run goes on.
+rolls on if its roll passes half a turn. Prints the verdict of the calculation, how much of the energy that its last
+turn needs it has, its verdict without restitution, which the run's clay does not have; the run's verdict, the roll
+(deg) at the end, and the ledger (%). Where the calculation does not cover a vehicle it says why: a ROPS that is folded
+down lands after the bonnet, which the regulation's order of blows does not know; the run goes on.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from rollover.assessment.ledger import closure
 from rollover.assessment.rolled import rolled
 from rollover.assessment.standing import scenario_of
 from rollover.dynamics.simulate import run
-from rollover.scenario import load
+from rollover.scenario import Scenario, load
 from rollover.spec.shapes import Tube
 from rollover.spec.vehicle import Vehicle
 from rollover.system.errors import InputError
@@ -82,17 +83,26 @@ NARROW: dict[str, dict[str, object]] = {
 }
 
 
+def calculated(scenario: Scenario, inputs: dict[str, float]) -> str:
+    """Verdict of the calculation, energy of its last turn over what that needs, verdict without restitution."""
+    try:
+        found, dead = (rolled(scenario, inputs | more)[1] for more in ({}, {"U": 0.0}))
+    except InputError as e:
+        return f"{e!s:38}"
+    turns = [s.symbol[1:] for s in found.steps if s.symbol[0] == "N"]  # in their order; E goes with each
+    needed, has = found[f"N{turns[-1]}"], found[f"E{turns[-1]}"]
+    share = has / needed if needed > 0.0 else math.inf
+    return f"{found.verdict:13} {share:9.2f} {dead.verdict:14}"
+
+
 def beside(name: str, changes: dict[str, object] | None = None, **inputs: float) -> tuple[str, str, float, float]:
-    """Verdict of the calculation, verdict of the run, its roll at the end (deg) and its ledger (%)."""
+    """The calculation in words, verdict of the run, its roll at the end (deg) and its ledger (%)."""
     vehicle = scenario_of(name).vehicle
     assert isinstance(vehicle, Vehicle)
     base = load("side_overturn_slope")
     slope = base.replaced({"ground.surface.angle_deg": math.degrees(0.588), "ground.elements.width": 48.0})
     scenario = slope.replaced({"vehicle": vehicle, "simulation.duration": 5.0}).replaced(changes or {}).of_many()
-    try:
-        planar = rolled(scenario, inputs)[1].verdict
-    except InputError as e:
-        planar = str(e)
+    planar = calculated(scenario, inputs)
     done = run(scenario)
     roll = np.degrees(np.abs(done.recording["chassis/roll"]))
     verdict = "continuous" if float(roll.max()) > 180.0 else "interrupted"
@@ -101,13 +111,15 @@ def beside(name: str, changes: dict[str, object] | None = None, **inputs: float)
 
 def main() -> None:
     """Print the table."""
-    print(f"{'vehicle':24} {'calculation':13} {'dynamic run':13} {'roll, deg':>9} {'ledger, %':>9}")
+    print(
+        f"{'vehicle':24} {'calculation':13} {'has/needs':>9} {'with U = 0':14} {'dynamic run':13} roll, deg ledger, %"
+    )
     cases: dict[str, tuple[str, dict[str, object]]] = {name: (name, {}) for name in sys.argv[1:] or SHIPPED}
     if sys.argv[1:] == ["--narrow"]:
         cases = {name: ("vineyard_tractor", changes) for name, changes in NARROW.items()}
     for name, (vehicle, changes) in cases.items():
         planar, dynamic, roll, ledger = beside(vehicle, changes)
-        print(f"{name:24} {planar:13} {dynamic:13} {roll:9.0f} {ledger:9.3f}", flush=True)
+        print(f"{name:24} {planar} {dynamic:13} {roll:9.0f} {ledger:9.3f}", flush=True)
 
 
 if __name__ == "__main__":

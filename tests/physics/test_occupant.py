@@ -15,7 +15,7 @@ from rollover.dynamics import simulate
 from rollover.dynamics.assembly import tables_of
 from rollover.dynamics.bodies import Body, bodies_of
 from rollover.dynamics.setup import set_up
-from rollover.kernels import occupant as k
+from rollover.kernels import links as k
 from rollover.kernels.forces import read_poses
 from rollover.kernels.generalised_alpha import turn
 from rollover.kernels.tables import OCCUPANT, Tables, handle

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from rollover.assessment.stability import StabilityAngle, losses, stability_angles
+from rollover.assessment.stability import SLIPS, StabilityAngle, losses, stability_angles
 from rollover.dynamics.support import closed_form, turning_slope
 from rollover.scenario import AnyVehicle, Scenario
 from rollover.spec import document
@@ -267,6 +267,32 @@ def test_the_same_as_the_tilt_table() -> None:
     assert math.degrees(found.lift_off) == pytest.approx(table["first_lift_off_deg"], abs=0.5)
     assert math.degrees(found.stop) == pytest.approx(table["stop_contact_deg"], abs=0.5)
     assert math.degrees(found.overturn) == pytest.approx(table["unstable_deg"], abs=0.5)
+
+
+@pytest.mark.parametrize("heading_deg", [165.0, 180.0])
+def test_front_wheels_that_roll_without_an_axle(heading_deg: float) -> None:
+    """Downhill the locked rear wheels alone hold it, until they all but lift: stiff tyres, the rigid closed form.
+
+    b cos(a) - h sin(a) is their load over that on level ground times b: 0.02 of it are 0.02 b/(b sin(a) + h cos(a)) of
+    slope before they carry nothing.
+    """
+    quad = standing("quad_bike")
+    assert isinstance(quad.vehicle, Vehicle)
+    changes: dict[str, object] = {f"vehicle.wheels.{w}.rolls": True for w in ("front_left", "front_right")}
+    for wheel in quad.vehicle.wheels:
+        for key, value in (("vertical_stiffness", 4e6), ("lateral_stiffness", 4e6), ("crown", 2e-4)):
+            changes[f"vehicle.wheels.{wheel.name}.tyre.{key}"] = value
+    scenario = quad.replaced(changes)
+    assert isinstance(scenario.vehicle, Vehicle)
+    rigid = closed_form(scenario.vehicle, math.radians(heading_deg)).rigid
+    b, h = 1.27 - 0.563, 0.583
+    slips = SLIPS * b / (b * math.sin(rigid) + h * math.cos(rigid))
+    assert 0.99 * (rigid - slips) < at(scenario, heading_deg).overturn < 1.01 * rigid
+
+
+def test_a_vehicle_with_a_trailer_is_refused() -> None:
+    with pytest.raises(InputError, match="with a trailer; one without"):
+        at(standing("tractor_trailer"), 90.0)
 
 
 def test_what_does_not_stand_says_so() -> None:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from ground.surface import Bank, Heightmap, Kerb, Ramp, Slope, Sum, Surface
 from rollover.dynamics.assembly import tables_of
 from rollover.dynamics.bodies import bodies_of
-from rollover.kernels.forces import read_poses, try_wheels
+from rollover.kernels.forces import read_poses
 from rollover.kernels.tables import E_DAMPING_NOW, E_DEPTH_NOW, E_ENERGY_NOW, E_FORCE_NOW, W_BOTTOM, W_C, W_KZ, handle
+from rollover.kernels.tyres import try_wheels
 from rollover.spec.frames import from_angles, matrices, rotation_vector
 from tests.physics.scenes import shipped
 
@@ -34,10 +35,11 @@ SURFACES: list[Surface] = [
 class Tyres:
     """The utility tractor's tyres without friction, held in a pose on a surface."""
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(self, surface: Surface, lying: float | None = None) -> None:
         changes: dict[str, Any] = {"ground.surface": surface, "initiation": {"kind": "driving", "speed": 0.0}}
         for wheel in ("front_left", "front_right", "rear_left", "rear_right"):
             changes[f"vehicle.wheels.{wheel}.tyre.friction"] = 0.0
+            changes[f"vehicle.wheels.{wheel}.tyre.lying_stiffness"] = lying
         scenario = shipped("side_overturn").replaced(changes)
         self.scenario = scenario
         self.bodies = bodies_of(scenario.vehicle, scenario.ground.elements)

@@ -87,7 +87,10 @@ def test_a_ramp_overturns_at_track_times_sine_of_the_balance(share: float, over:
     height = share * 1.27 * math.sin(math.atan(s / h))
     ramp = {"kind": "ramp", "length": 8.0, "height": height, "width": 0.8, "top": 8.0, "start": [2.4, 0.635]}
     changes = {"ground.surface": ramp, "initiation.speed": 4.0, "simulation.duration": 5.0}
-    rec = done(base.replaced({**changes, "vehicle.outline": []})).recording  # whose floor would bear on the ramp
+    rigid = {f"vehicle.wheels.{w.name}.suspension": None for w in base.vehicle.wheels}  # as the closed form has it
+    rec = done(
+        base.replaced({**changes, **rigid, "vehicle.outline": []})
+    ).recording  # whose floor would bear on the ramp
     roll = rec["chassis/roll"]
     assert bool(math.degrees(roll.max()) > 80.0) is over
     if not over:  # on the top it leans as the height of its wheels says
@@ -201,6 +204,7 @@ FALLS = {
     "side_by_side": ("side_overturn", "bank_overturn"),
     "mini_excavator": ("side_overturn", "side_overturn_slope"),
     "electric_tractor": ("side_overturn", "ditch"),
+    "tractor_trailer": ("side_overturn_slope",),  # and trailer_overturn, forwarder_overturn
 }
 
 

@@ -294,7 +294,7 @@ def test_a_folded_rops_is_the_upright_one_turned() -> None:
 
 
 # nothing on wheels, or no front axle that swings: no tractor, whose pendulum test anchors the pitch inertia
-WITHOUT_AXLE = ("rops_rig", "acrylic_cube", "skid_load", "quad_bike", "side_by_side", "mini_excavator")
+WITHOUT_AXLE = ("rops_rig", "acrylic_cube", "skid_load", "quad_bike", "side_by_side", "mini_excavator", "forwarder")
 
 
 @pytest.mark.parametrize("path", [p for p in VEHICLES if p.stem not in WITHOUT_AXLE], ids=name_of)
@@ -316,7 +316,7 @@ def test_the_list_of_vehicles_shows_their_pitch_inertia() -> None:
     assert shown["rops_rig"] == ""
 
 
-@pytest.mark.parametrize("name", ["rops_rig", "quad_bike", "side_by_side", "mini_excavator"])
+@pytest.mark.parametrize("name", ["rops_rig", "quad_bike", "side_by_side", "mini_excavator", "forwarder"])
 def test_without_axles_there_is_no_pitch_inertia_to_state(name: str) -> None:
     assert pitch_inertia(document.load(FOLDER / f"vehicles/{name}.yaml", scenarios.AnyVehicle)) is None
 

@@ -58,6 +58,7 @@ RUN = [
     "docs/commands.md",
     "docs/inputs.md",
     "docs/occupant.md",
+    "docs/articulated.md",
     "docs/own_law.md",
     "docs/viewing.md",
     "docs/python.md",

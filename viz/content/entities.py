@@ -82,7 +82,7 @@ class Series:
     """How one channel is shown: value for people = value in SI x `factor`, in `unit`."""
 
     channel: str
-    group: str  # first part of the path: loads, wheels, mounts, sinkage, motion, energy, inputs, occupant, other
+    group: str  # first part of the path: loads, wheels, mounts, sinkage, motion, energy, inputs, occupant, hitch, ...
     path: str  # without the source
     name: str  # without the unit, which stands in the title of a plot
     legend: str  # shorter, where the title says the rest
@@ -185,8 +185,8 @@ def _describe(channel: str) -> tuple[str, str, int]:
         case ["sensor", name, what]:
             group, quantity, shade = "motion", *_motion("sensor", what)
             return group, f"{name.replace('_', ' ')}: {quantity}", shade
-        case ["occupant", *rest]:
-            return "occupant", *_describe_occupant(rest)
+        case ["occupant" | "hitch" | "trailer" | "suspension" as of, *rest]:
+            return _describe_linked(of, rest)
         case ["energy", name]:
             return "energy", name, LEDGER.get(name, _any(name))
         case ["axle", name, what]:
@@ -214,6 +214,13 @@ def _describe_rops(channel: str, rest: list[str]) -> tuple[str, str, int]:
         case ["energy"]:
             return "energy", "absorbed by the ROPS", CYCLE[0]
     return "other", channel, _any(channel)
+
+
+def _describe_linked(of: str, rest: list[str]) -> tuple[str, str, int]:
+    """What links hold: a trailer, a sprung wheel, an occupant."""
+    if of in ("hitch", "trailer"):
+        return "hitch", f"{of} {rest[0].replace('_', ' ')}", _any(f"{of} {rest[0]}")
+    return of, *_describe_occupant(rest)
 
 
 def _describe_occupant(rest: list[str]) -> tuple[str, int]:

@@ -38,6 +38,10 @@ LOADS: _Plots = (
     ("Impulse, N s", ("ground/impulse_normal", "rops/impulse")),
     ("Axle stop, N m s", ("axle/*/impulse",)),
     ("Contact area, cm\N{SUPERSCRIPT TWO}", ("ground/contact_area",)),
+    ("Hitch, kN", ("hitch/force",)),
+    ("Hitch, kN m", ("hitch/moment",)),
+    ("Suspension, kN", ("suspension/*/force",)),
+    ("Suspension, m", ("suspension/*/travel",)),
     ("Occupant, kN", ("occupant/*/contact_force", "occupant/*/ground_force", "occupant/*/force")),
 )
 MOTION: _Plots = (
@@ -54,6 +58,7 @@ MOTION: _Plots = (
     ("Striker position, m", ("striker/position_z",)),
     ("Acceleration, m/s\N{SUPERSCRIPT TWO}", ("chassis/acceleration_?",)),
     ("Attitude, deg", ("chassis/pitch", "chassis/yaw", "axle/*/angle")),
+    ("Trailer, deg", ("trailer/*", "hitch/angle_?")),
     ("Position, m", ("chassis/position_?",)),
     ("Velocity, m/s", ("chassis/velocity_?",)),
     ("Head and torso, m/s\N{SUPERSCRIPT TWO}", ("occupant/head/acceleration_?", "occupant/torso/acceleration_?")),

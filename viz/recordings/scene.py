@@ -18,6 +18,7 @@ from rollover.spec.inertia import MassProperties
 from rollover.spec.rops import ClearanceZone, Rops
 from rollover.spec.shapes import Box, Disc, Point, Points, Shape, Tube, axes_along
 from rollover.spec.stand import PendulumBlow, StaticTest
+from rollover.spec.trailer import Trailer
 from rollover.spec.vehicle import RigidBody, Striker, Vehicle, Wheel, laden
 from viz.content.entities import escaped
 from viz.recordings.rig import rig
@@ -49,7 +50,7 @@ def _vehicle(vehicle: Vehicle | RigidBody) -> tuple[Part, ...]:
         # nothing was said of its shape: the cuboid with the same mass, centre and moments of inertia
         found.append(_equivalent(vehicle.whole, f"{chassis}/equivalent_cuboid"))
     for wheel in vehicle.wheels:
-        found += _wheel(wheel, f"{body_path(wheel.carrier)}/{escaped(wheel.name)}")
+        found += _wheel(wheel, f"{body_path(wheel.hub)}/{escaped(wheel.name)}")
     rear = [w for w in vehicle.wheels if w.carrier == "chassis"]
     for i, (a, b) in enumerate(_opposite(rear)):
         # not part of the model: without it the wheels would hang in the air
@@ -59,6 +60,8 @@ def _vehicle(vehicle: Vehicle | RigidBody) -> tuple[Part, ...]:
             found.append(_beam(vehicle.front_axle.pivot, wheel.centre, f"{axle}/beam_{escaped(wheel.name)}"))
         x, y, z = vehicle.front_axle.pivot
         found.append(Rod(path=f"{axle}/pivot", start=(x - 0.15, y, z), end=(x + 0.15, y, z), radius=0.05, colour=STEEL))
+    if vehicle.trailer is not None:
+        found += _trailer(vehicle.trailer, [w for w in vehicle.wheels if w.carrier == "trailer"])
     if vehicle.rops is not None:
         found += _rops(vehicle.rops)
     for mass in vehicle.attached:
@@ -72,6 +75,17 @@ def _vehicle(vehicle: Vehicle | RigidBody) -> tuple[Part, ...]:
         for part, shape in occupant.outlines.items():
             found.append(_solid(shape, f"{body_path(f'occupant_{part}')}/{part}", LOAD))
     return tuple(found)
+
+
+def _trailer(trailer: Trailer, wheels: list[Wheel]) -> list[Part]:
+    """Its outline, its axles, and a ball where it hangs on the vehicle."""
+    root = body_path("trailer")
+    found = [_solid(s, f"{root}/{escaped(s.name)}", PAINT[i % len(PAINT)]) for i, s in enumerate(trailer.outline)]
+    if not trailer.outline:
+        found.append(_equivalent(trailer.body, f"{root}/equivalent_cuboid"))
+    found += [_beam(a.centre, b.centre, f"{root}/axle_{i}") for i, (a, b) in enumerate(_opposite(wheels))]
+    hitch = np.array([trailer.hitch.position])
+    return [*found, Balls(path=f"{root}/hitch", centres=hitch, radii=np.array([0.08]), colour=DARK_STEEL)]
 
 
 def _stand(run: Run) -> tuple[Part, ...]:

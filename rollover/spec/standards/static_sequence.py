@@ -12,7 +12,7 @@ from rollover.spec.shapes import Box, Point, Shape, Tube
 from rollover.spec.stand import Code, From, StaticLoad, StaticTest, Step
 from rollover.spec.standards.codes import STANDARDS, Tractor
 from rollover.spec.standards.requirement import Requirement
-from rollover.spec.vehicle import Vehicle
+from rollover.spec.vehicle import Vehicle, alone
 
 NARROW = 1.150  # m, track below which Codes 6 and 7 apply instead of Code 4; scope of the codes, recalled
 NARROW_MASSES = (400.0, 3500.0)  # kg, of Codes 6 and 7; scope of the codes, recalled
@@ -45,10 +45,11 @@ class Push:
 
 
 def tractor_of(vehicle: Vehicle, *, folding: bool | None = None) -> Tractor:
-    """What the standards ask of a vehicle: its mass without what is attached, wheelbase, rear share, widths.
+    """What the standards ask of a vehicle: its mass without what is attached and drawn, wheelbase, rear share, widths.
 
     A ROPS with hinges tilts or folds, unless `folding` says otherwise.
     """
+    vehicle = alone(vehicle)
     x = [wheel.centre[0] for wheel in vehicle.wheels]
     wheelbase = max(x) - min(x) if x else 0.0
     sides = [abs(w.centre[1]) + 0.5 * w.tyre.width for w in vehicle.wheels]

@@ -1,8 +1,8 @@
-"""Compiled: what holds an occupant: ball joints with stops, straps that pull only, spheres against boxes and tubes.
+"""Compiled: links: ball joints with stops, straps that pull only, spheres against boxes and tubes, struts of wheels.
 
-A row of `link_i` says kind, body b, body a and the first place in `link_out`; the same row of `link_f` its numbers,
-points about the centres of mass of b and a. All springs are functions of the bodies' relative pose alone, so that what
-they hold is an energy; what their dashpots and friction take is the power that the ledger adds to it.
+A row of `link_i` says kind, body b, body a, the first place in `link_out` and the account; the same row of `link_f` its
+numbers, points about the centres of mass of b and a. All springs are functions of the bodies' relative pose alone, so
+that what they hold is an energy; what their dashpots and friction take is the power that the ledger adds to it.
 """
 
 from __future__ import annotations
@@ -14,17 +14,18 @@ import numpy as np
 
 from ground.compiled import compiled, leaf
 from rollover.kernels.compliant_joints import relative_turn, turned
-from rollover.kernels.tables import OCCUPANT, OMEGA, ROT, X
+from rollover.kernels.tables import OMEGA, ROT, X
 from rollover.kernels.terms import add_both
 from rollover.kernels.vectors import add_between, direction_row, place, spin, to_body, to_world, velocity
 
-JOINT, STRAP, BLOCK, BAR = 0, 1, 2, 3  # kinds
+JOINT, STRAP, BLOCK, BAR, STRUT = 0, 1, 2, 3, 4  # kinds
 # columns of link_f: point on b, point on a (of a block its lower, of a bar its first corner), stiffness and dashpot
 L_B, L_A, L_K, L_C = 0, 3, 6, 7
 L_TURN, L_DAMP, L_LOW, L_HIGH, L_STOP = 8, 11, 14, 17, 20  # of a joint: N m/rad, N m s/rad, angles, N m/rad
 L_LENGTH = 8  # of a strap, unstrained
 L_END, L_RADIUS, L_MU = 8, 11, 12  # of a block or bar: its other corner or end, reach of the sphere, friction
-LINK_COLUMNS = 21
+# of a strut, besides a joint's: along z spring, dashpot, force in the design position, travel down and up, stop
+L_SPRING, L_DASHPOT, L_PRELOAD, L_DROOP, L_BUMP, L_TRAVEL_STOP, LINK_COLUMNS = 21, 22, 23, 24, 25, 26, 27
 # columns of link_memory: energy and power at the step's start and now; force on b (3; of a
 # touch in world axes, of a joint in those of a), moment on b (3)
 HELD, POWER, HELD_NOW, POWER_NOW, L_FORCE, L_MOMENT, LINK_MEMORY = 0, 1, 2, 3, 4, 7, 10
@@ -40,7 +41,7 @@ def try_links(t: Any, Q: Any) -> None:
     room = np.empty((5, 3))
     for i in range(t.link_i.shape[0]):
         kind = t.link_i[i, 0]
-        if kind == JOINT:
+        if kind in (JOINT, STRUT):
             try_joint(t, i, room, Q)
         elif kind == STRAP:
             try_strap(t, i, room, Q)
@@ -57,7 +58,10 @@ def seen_from(under: Any, upper: Any, r: Any, found: Any) -> None:
 
 @leaf
 def try_joint(t: Any, i: int, room: Any, Q: Any) -> None:
-    """Springs along and about a's axes; stops beyond the range of each angle of the rotation vector."""
+    """Springs along and about a's axes; stops beyond the range of each angle of the rotation vector.
+
+    Of a strut that along z has a preload, a dashpot and stops of its own: N = P + k d + k_s (d beyond the travel).
+    """
     turn, rates, moved, force, local = room[0], room[1], room[2], room[3], room[4]
     f, g, b, a = t.link_f[i], t.link_memory[i], t.link_i[i, 1], t.link_i[i, 2]
     under, upper, r = t.pose[a], t.pose[b], f[L_B : L_B + 3]
@@ -73,13 +77,21 @@ def try_joint(t: Any, i: int, room: Any, Q: Any) -> None:
     held, power = 0.0, 0.0
     for k in range(3):
         d = local[k] - f[L_A + k]
-        force[k] = -f[L_K] * d - f[L_C] * rate[k]
+        if k == 2 and t.link_i[i, 0] == STRUT:
+            over = d - min(max(d, f[L_DROOP]), f[L_BUMP])
+            force[2] = -f[L_PRELOAD] - f[L_SPRING] * d - f[L_TRAVEL_STOP] * over - f[L_DASHPOT] * rate[2]
+            held += f[L_PRELOAD] * d + 0.5 * (f[L_SPRING] * d * d + f[L_TRAVEL_STOP] * over * over)
+            power += f[L_DASHPOT] * rate[2] * rate[2]
+        else:
+            force[k] = -f[L_K] * d - f[L_C] * rate[k]
+            held += 0.5 * f[L_K] * d * d
+            power += f[L_C] * rate[k] * rate[k]
         beyond = turn[k] - min(max(turn[k], f[L_LOW + k]), f[L_HIGH + k])
         stop = f[L_STOP] * beyond
         damped = stop * max(1.0 + STOP_DAMPING * math.copysign(moved[k], beyond * moved[k]), 0.0)
         rates[k] = -f[L_TURN + k] * turn[k] - f[L_DAMP + k] * moved[k] - damped
-        held += 0.5 * (f[L_K] * d * d + f[L_TURN + k] * turn[k] * turn[k] + stop * beyond)
-        power += f[L_C] * rate[k] * rate[k] + f[L_DAMP + k] * moved[k] * moved[k] + (damped - stop) * moved[k]
+        held += 0.5 * (f[L_TURN + k] * turn[k] * turn[k] + stop * beyond)
+        power += f[L_DAMP + k] * moved[k] * moved[k] + (damped - stop) * moved[k]
     turned(turn, beta, 1.0, rates, moved)
     for k in range(3):
         g[L_FORCE + k], g[L_MOMENT + k] = force[k], moved[k]
@@ -191,7 +203,7 @@ def finish_links(t: Any, h: float) -> None:
         t.link_out[k] = 0.0
     for i in range(t.link_i.shape[0]):
         g, at = t.link_memory[i], t.link_i[i, 3]
-        t.work[OCCUPANT] += g[HELD_NOW] - g[HELD] + 0.5 * h * (g[POWER] + g[POWER_NOW])
+        t.work[t.link_i[i, 4]] += g[HELD_NOW] - g[HELD] + 0.5 * h * (g[POWER] + g[POWER_NOW])
         keep_link(t, i, at)
 
 
@@ -203,7 +215,7 @@ def keep_link(t: Any, i: int, at: int) -> None:
     if kind == STRAP:
         t.link_out[at] += g[L_FORCE]
         return
-    for k in range(6 if kind == JOINT else 3):
+    for k in range(6 if kind in (JOINT, STRUT) else 3):
         t.link_out[at + k] += g[L_FORCE + k]
 
 
@@ -215,7 +227,7 @@ def stiffen_links(t: Any, f: float, fd: float, K: Any) -> None:
     J, room = np.zeros((2, 6)), np.empty((5, 3))
     for i in range(t.link_i.shape[0]):
         kind = t.link_i[i, 0]
-        if kind == JOINT:
+        if kind in (JOINT, STRUT):
             stiffen_joint(t, i, f, fd, J, room, K)
         elif kind == STRAP:
             stiffen_strap(t, i, f, fd, J, room, K)
@@ -234,7 +246,13 @@ def stiffen_joint(t: Any, i: int, f: float, fd: float, J: Any, room: Any, K: Any
         x, y, z = under[ROT + k], under[ROT + 3 + k], under[ROT + 6 + k]
         direction_row(upper, r, x, y, z, J[0])
         direction_row(under, local, x, y, z, J[1])
-        add_both(K, f * n[L_K] + fd * n[L_C], J, 6 * b, 6 * a)
+        along = f * n[L_K] + fd * n[L_C]
+        if k == 2 and t.link_i[i, 0] == STRUT:
+            d = local[2] - n[L_A + 2]
+            along = f * n[L_SPRING] + fd * n[L_DASHPOT]
+            if d < n[L_DROOP] or d > n[L_BUMP]:
+                along += f * n[L_TRAVEL_STOP]
+        add_both(K, along, J, 6 * b, 6 * a)
         beyond = abs(turn[k] - min(max(turn[k], n[L_LOW + k]), n[L_HIGH + k]))
         about = f * n[L_TURN + k] + fd * n[L_DAMP + k]
         if beyond > 0.0:
