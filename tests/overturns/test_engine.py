@@ -97,7 +97,7 @@ def test_the_axle_turns_between_its_stops() -> None:
     assert built.joint("axle").limited
 
 
-def test_a_plan_has_effects_beside_the_engine_or_the_engine_alone() -> None:
+def test_a_plan_has_effects_beside_the_engine_or_it_alone() -> None:
     orders = plan(3 * len(EFFECTS), 3, ["foreign-engine", "background"])
     kinds = Counter(o.kind for o in orders)
     assert set(kinds) == {"foreign-engine", "background"}
