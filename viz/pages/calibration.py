@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import pchip_interpolate
 
 from rollover.calibration.calibrate import Calibration, Estimate, Score
 from rollover.calibration.posterior import Posterior
+from rollover.calibration.prediction import NORMAL_95
 from rollover.comparison.misfit import Misfit
 from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table, as_sentence
 from viz.content.differences import differences_section
@@ -20,6 +23,7 @@ from viz.figures.plots import Curve, Level
 from viz.pages.page import render
 from viz.pages.posterior import open_values
 
+Array = NDArray[np.float64]
 SPOKEN = 3  # values that a headline still has room for
 OPEN = 4  # figures of curves that are not folded away
 BELOW = 0.1  # of chi-squared: less is the roughness of contacts that fall between two steps or not
@@ -30,11 +34,15 @@ def page(
     c: Calibration,
     *,
     curves: Sequence[tuple[Misfit, Misfit]] = (),
+    open_by: Mapping[tuple[str, str], Array] = MappingProxyType({}),
     command: str,
     scenario_hash: str = "",
     versions: Mapping[str, str] | None = None,
 ) -> str:
-    """HTML of a calibration; `curves` are the comparisons of each recording before and after."""
+    """HTML of a calibration; `curves` are the comparisons of each recording before and after.
+
+    `open_by` is 1 sigma (n,) of the calibrated curve of a recording and channel, SI, that the values leave open.
+    """
     columns = ["parameter", "unit", "was", "is", "from", "to", "interval", "if the others were known", ""]
     table = Table(
         columns=columns,
@@ -44,7 +52,7 @@ def page(
     )
     blocks: list[Block] = [
         *differences_section(c.scenario),
-        *_curves(curves),
+        *_curves(curves, open_by),
         Section(title="Parameters", blocks=[*_spans(c), table]),
     ]
     blocks += [Note(text=f"{as_sentence(w)}.", warning=True) for w in c.warnings]
@@ -92,7 +100,7 @@ def page(
     )
 
 
-def _curves(curves: Sequence[tuple[Misfit, Misfit]]) -> list[Block]:
+def _curves(curves: Sequence[tuple[Misfit, Misfit]], open_by: Mapping[tuple[str, str], Array]) -> list[Block]:
     """Each channel of each recording before and after; the first few at once, the others folded away."""
     figures: list[Block] = []
     for before, after in curves:
@@ -102,7 +110,10 @@ def _curves(curves: Sequence[tuple[Misfit, Misfit]]) -> list[Block]:
             curve = None
             if now is not None:
                 simulated = np.interp(was.time, now.time, now.simulated)
-                curve = Curve(name="after", x=was.time, y=simulated * s.factor)
+                sigma = open_by.get((before.recording, was.channel))
+                wide = None if sigma is None or sigma.shape != now.time.shape else NORMAL_95 * s.factor * sigma
+                spread = None if wide is None else np.interp(was.time, now.time, wide)
+                curve = Curve(name="after", x=was.time, y=simulated * s.factor, spread=spread)
             svg = plots.before_after(
                 Curve(name="measured", x=was.time, y=was.measured * s.factor),
                 Curve(name="before", x=was.time, y=was.simulated * s.factor),
@@ -112,12 +123,20 @@ def _curves(curves: Sequence[tuple[Misfit, Misfit]]) -> list[Block]:
                 phases=before.phases,
             )
             over = "noise" if was.noise else "1 % of the range, as no noise is known"
-            text = f"{before.recording}, {was.channel}; below, measured less simulated over the {over}."
+            band = f"; band: {_widest(curve, s.unit)}" if curve is not None and curve.spread is not None else ""
+            text = f"{before.recording}, {was.channel}{band}; below, measured less simulated over the {over}."
             figures.append(Figure(svg=svg, caption=text))
     if not figures:
         return []
     rest = [Details(summary=f"{len(figures) - OPEN} more channels", blocks=figures[OPEN:])] if figures[OPEN:] else []
     return [Section(title="Before and after", blocks=[*figures[:OPEN], *rest])]
+
+
+def _widest(curve: Curve, unit: str) -> str:
+    """What a band is, and how wide it becomes."""
+    assert curve.spread is not None
+    at = int(np.argmax(curve.spread))
+    return f"95 %, by what the fitted values leave open, at most {curve.spread[at]:.2g} {unit} at {curve.x[at]:.3g} s"
 
 
 def _spans(c: Calibration) -> list[Block]:

@@ -17,6 +17,9 @@ from rollover.system.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from rollover.calibration.calibrate import Calibration
     from rollover.comparison.misfit import Misfit
     from rollover.recording import Recording
@@ -109,7 +112,12 @@ def calibrate(
         command = " ".join(map(shlex.quote, ["rollover", "calibrate", scenario, *recordings, *options]))
         curves = _curves(chosen, found, request.recordings)
         text = page(
-            found, curves=curves, command=command, scenario_hash=about["scenario_hash"], versions=results.versions()
+            found,
+            curves=curves,
+            open_by=_open_by(found, request.recordings) if curves else {},
+            command=command,
+            scenario_hash=about["scenario_hash"],
+            versions=results.versions(),
         )
         (part / PAGE).write_text(text, encoding="utf-8")
     if as_json:
@@ -129,6 +137,18 @@ def _curves(chosen: Scenario, found: Calibration, recordings: Mapping[str, Recor
         console.say(f"{PAGE} is without curves before and after: {e.faults[0]}")
         return []
     return list(zip(before, after, strict=True))
+
+
+def _open_by(found: Calibration, recordings: Mapping[str, Recording]) -> dict[tuple[str, str], NDArray[np.float64]]:
+    """One sigma (n,) of each simulated curve by recording and channel, SI, that the fitted values leave open."""
+    from rollover.calibration.prediction import prediction_error
+    from rollover.comparison.compared import compared
+
+    def curves(scenario: Scenario) -> dict[tuple[str, str], NDArray[np.float64]]:
+        made = compared(scenario.of_many(), recordings).misfits
+        return {(m.recording, c.channel): c.simulated for m in made for c in m.channels}
+
+    return prediction_error(found, curves)
 
 
 def _options(fit: list[str], hold_out: list[str] | None) -> list[str]:
