@@ -121,7 +121,10 @@ def _holds(named: Mapping[str, Any], effect: Mapping[str, Any]) -> bool:
 def _where(
     effects: Sequence[Mapping[str, Any]], found: Mapping[str, Any], detected: bool, titles: Sequence[str]
 ) -> dict[str, Any]:
-    """Whether the first place named is one where the effect shows: a channel that feels it, at a time when it does."""
+    """Whether the first place named is one where the effect shows: a channel that feels it, at a time when it does.
+
+    None of each where nothing was detected, or an answer gives no places at all.
+    """
     row: dict[str, Any] = {"place_right": None, "channel_right": None, "dependence_right": None}
     places = list(found.get("where") or [])
     if not effects or not detected:
@@ -131,15 +134,16 @@ def _where(
     felt: dict[str, float] = {}
     for cell in cells:
         felt[cell["channel"]] = felt.get(cell["channel"], 0.0) + cell["share"]
-    row["channel_right"] = bool(felt.get(top.get("channel", ""), 0.0) >= FELT)
-    number = _number(top.get("recording"), titles)
-    row["place_right"] = row["channel_right"] and any(
-        cell["channel"] == top["channel"]
-        and (number is None or cell["recording"] == number)
-        and float(top.get("start", -math.inf)) <= cell["end"]
-        and float(top.get("end", math.inf)) >= cell["start"]
-        for cell in cells
-    )
+    if "where" in found:
+        row["channel_right"] = bool(felt.get(top.get("channel", ""), 0.0) >= FELT)
+        number = _number(top.get("recording"), titles)
+        row["place_right"] = row["channel_right"] and any(
+            cell["channel"] == top["channel"]
+            and (number is None or cell["recording"] == number)
+            and float(top.get("start", -math.inf)) <= cell["end"]
+            and float(top.get("end", math.inf)) >= cell["start"]
+            for cell in cells
+        )
     wanted = effects[0]["depends_on"]
     if effects[0]["kind"] == "outside" and wanted:
         said = " ".join(str(p.get("depends_on") or "") for p in places)

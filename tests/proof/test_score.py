@@ -80,6 +80,12 @@ def test_where_it_was_seen(place: dict[str, Any], channel: bool, hit: bool) -> N
     assert (row["channel_right"], row["place_right"]) == (channel, hit)
 
 
+@pytest.mark.parametrize(("more", "right"), [({}, None), ({"where": []}, False)])
+def test_an_answer_without_places_is_not_scored_by_them(more: dict[str, Any], right: bool | None) -> None:
+    row = score(truth(effect()), said("soil-viscous-damping", **more))
+    assert (row["channel_right"], row["place_right"]) == (right, right)
+
+
 def test_in_the_set_but_not_first() -> None:
     found = said("soil-inertial-drag")
     found["effects"][0]["indistinguishable_from"] = ["soil-viscous-damping"]

@@ -48,7 +48,7 @@ def widened(run: Run, most: float) -> Run:
 
 def told(run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> tuple[dict[str, float], str, str, str]:
     answer = results.write(tmp_path / "out", run, [], force=True)
-    console.report(run, [], [], answer, "out")
+    console.report(run, [], [], answer, "out", headline="It fell.")
     pages = report.page(run, [], answer, rows=[], command="rollover run")
     return answer["ledger"], capsys.readouterr().out, pages, verdict(run, [])
 

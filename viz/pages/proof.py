@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rollover.effects import spoken
 from rollover.system.numbers import percent
 from viz.content.blocks import (
     Block,
@@ -213,7 +214,7 @@ def _failures(report: Mapping[str, Any]) -> list[Block]:
                 _listed(m["truth"]),
                 Cell(str(m["verdict"]), "fail"),
                 _listed(m["named"]) or "nothing",
-                f"{m['signal_to_noise']:.3g}",
+                spoken(m["signal_to_noise"]),
             ]
             for m in wrong
         ]

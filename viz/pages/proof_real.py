@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from rollover.effects import spoken
 from viz.content.blocks import Block, Cell, Figure, Note, Section, Table
 from viz.figures.counts import Share, shares
 from viz.figures.reliability import reliability
@@ -48,7 +49,7 @@ def _real(real: Mapping[str, Any] | None) -> list[Block]:
                 group.replace("to inf", "and more"),
                 str(line["cases"]),
                 *(str(line[part]["hits"]) for part in ("detected", "in_set", "first", "alone", "another_name")),
-                "" if line["signal_to_noise"] is None else f"{line['signal_to_noise']:.3g}",
+                "" if line["signal_to_noise"] is None else spoken(line["signal_to_noise"]),
             ]
             for group, line in real[key].items()
         ]
