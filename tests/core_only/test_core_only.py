@@ -36,6 +36,7 @@ COMMANDS = {
     "reliability": ["study", "reliability.yaml"],
     "xlsx": ["import", "balls", "--as", "falling-balls"],
     "posterior": ["calibrate", "drop_test", "d.csv", "--fit", "vehicle.mass", "--posterior"],
+    "proof": ["prove", "--kinds", "foreign-engine", "--cases", "1"],
 }
 CSV = "t,F\n" + "".join(f"{k * 1e-3},{(k * k) % 7 * 1e-2}\n" for k in range(200))
 SIDECAR = """format: rollover-recording/1

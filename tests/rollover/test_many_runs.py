@@ -301,9 +301,9 @@ def test_the_check_s_limit_is_student_s() -> None:
 def test_neighbours_of_a_run_are_many_and_the_run_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
     made = []
 
-    def seen(scenario: Any) -> Any:
+    def seen(scenario: Any, **more: Any) -> Any:
         made.append(scenario.integrator)
-        return simulate_run(scenario)
+        return simulate_run(scenario, **more)
 
     simulate_run = simulate.run
     monkeypatch.setattr(simulate, "run", seen)
