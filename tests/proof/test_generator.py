@@ -119,7 +119,10 @@ def test_a_seed_makes_the_same_case_after_newer_kinds(which: tuple[int, str, tup
     samples = [values for r in case.recordings for values in r.channels.values()]
     found = sum(float(np.nansum(np.abs(v)) / np.nanmax(np.abs(v))) for v in samples)
     parameters = sum(v for e in case.truth["effects"] for v in e["parameters"].values())
-    assert (found, parameters, case.truth["signal_to_noise"]) == pytest.approx(BEFORE[which], rel=1e-7)
+    *drawn, strength = BEFORE[which]
+    assert (found, parameters) == pytest.approx(tuple(drawn), rel=1e-7)
+    # a difference of two solutions: their events lie where the rounding of a processor puts them (2.8e-7 between two)
+    assert case.truth["signal_to_noise"] == pytest.approx(strength, rel=1e-6)
     assert not {"background", "explains"} & set(case.truth)
     assert all("form" not in e and "over_background" not in e for e in case.truth["effects"])
 

@@ -1,4 +1,4 @@
-"""Pages of plans, rolling, frames and stability in which one text stands wherever a word from data may."""
+"""Pages of plans, rolling, frames, stability and soils in which one text stands wherever a word from data may."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from rollover.assessment.rolled import json_of, rolled
 from rollover.assessment.standing import scenario_of
 from rollover.diagnosis.planning.next_test import Advice, NextTest
 from rollover.diagnosis.planning.plan import Detectable, Pair, Plan
+from rollover.scenario import load
+from viz.pages import identification as identification_page
 from viz.pages import plan as plan_page
 from viz.pages import rolling as rolling_page
 from viz.pages import rops as rops_page
@@ -99,4 +101,24 @@ def _stability(text: str) -> str:
     return stability_page.page(answer, command=text)
 
 
-PAGES: dict[str, Callable[[str], str]] = {"plan": _plan, "rolling": _rolling, "stability": _stability, "rops": _rops}
+def _identification(text: str, *, forms: bool = False) -> str:
+    ends = {"value": 1.0, "low": None, "high": 2.0}
+    drop = {"name": text, "speed": 2.0, "mass": 132.0, "area": 0.0063}
+    drop |= {"stiffness": {"depth": [0.01, 0.02], "value": [5e4, 5e4], "sd": [1.0, 1.0]}}
+    numbers = {"law": text, "recordings": [text], "drops": [drop], "law_mass": "reference"}
+    numbers |= {"coefficients": [{"name": text, "origin": "neutral", "why": text, **ends}]}
+    errors = dict.fromkeys(("residual", "log_scatter", "held_out_deceleration_error", "held_out_depth_error"), 0.1)
+    form = {"name": text, "statement": text, "numbers": [{"name": text, **ends}], **errors}
+    of_forms = {"law": text, "recordings": [text], "drops": [], "chosen": text, "forms": [form]}
+    words: dict[str, Any] = {"refused": [text], "remarks": [text], "command": text, "versions": {text: text}}
+    return identification_page.page(load("drop_test").ground.law, of_forms if forms else numbers, **words)
+
+
+PAGES: dict[str, Callable[[str], str]] = {
+    "plan": _plan,
+    "rolling": _rolling,
+    "stability": _stability,
+    "rops": _rops,
+    "identification": _identification,
+    "identification of a cone": functools.partial(_identification, forms=True),
+}

@@ -162,7 +162,7 @@ def page_of(kind: str, folder: Path) -> str:
 def test_no_kind_of_page_is_left_out() -> None:
     """Whatever writes a page is among `KINDS`: one that is added later is tried too."""
     by_kind = {"run": "report", "compare": "comparison", "two runs": "pair", "diagnose": "diagnosis", "prove": "proof"}
-    by_kind |= {"score": "proof"}
+    by_kind |= {"score": "proof", "identification of a cone": "identification"}
     by_kind |= {"regress": "regression", "calibrate": "calibration", "viewer": "web_page", "every block": "page"}
     write = {m.name for m in pkgutil.iter_modules(pages.__path__) if _writes_a_page(m.name)}
     assert write == {by_kind.get(kind, kind) for kind in KINDS} - {"page"}

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ground.law import REFERENCE_AREA, REFERENCE_MASS, GroundLaw, along
+from rollover.system.numbers import percent
 from viz.content.blocks import Block, Cell, Figure, Footer, Headline, Note, Section, Table, as_sentence
 from viz.figures import plots
 from viz.figures.plots import Curve
@@ -17,11 +18,21 @@ SURE = 0.2  # of the stiffness: what is known less surely takes no part in the r
 
 
 def headline(numbers: Mapping[str, Any]) -> str:
-    """How much of the law the drops determine."""
-    found = [c["origin"] == "data" for c in numbers["coefficients"]]
+    """How much of the law the drops determine; of forms that compete, which one predicts best."""
     count = len(numbers["recordings"])
     drops = f"{count} drop{'s' * (count != 1)}"
+    if "forms" in numbers:
+        best = _best(numbers)
+        errors = [best["held_out_deceleration_error"], best["held_out_depth_error"]]
+        missed = " and ".join(f"{percent(e)} of {of}" for e, of in zip(errors, ("deceleration", "depth"), strict=True))
+        return f"Law {numbers['law']} from {drops}: the form {best['name']} misses {missed} of drops left out"
+    found = [c["origin"] == "data" for c in numbers["coefficients"]]
     return f"Law {numbers['law']} from {drops}: {sum(found)} of {len(found)} coefficients are determined"
+
+
+def _best(numbers: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The form that was chosen."""
+    return next(f for f in numbers["forms"] if f["name"] == numbers["chosen"])
 
 
 def page(
@@ -34,15 +45,15 @@ def page(
     versions: Mapping[str, str],
 ) -> str:
     """HTML of a law; `numbers` is what identify.json says, `refused` and `remarks` are sentences."""
-    rows = [
-        [c["name"], f"{c['value']:.5g}", _end(c["low"]), _end(c["high"]), _origin(c)] for c in numbers["coefficients"]
-    ]
+    given = _best(numbers)["numbers"] if "forms" in numbers else numbers["coefficients"]
+    rows = [[c["name"], f"{c['value']:.5g}", _end(c["low"]), _end(c["high"]), _origin(c)] for c in given]
     columns = ["coefficient", "value", "95 % from", "to", ""]
-    open_ = any(c["origin"] != "data" for c in numbers["coefficients"])
+    open_ = any(c.get("origin", "data") != "data" for c in given)
     blocks: list[Block] = [Note(text=f"{as_sentence(text)}.", warning=True) for text in refused]
     blocks += _curves(law, numbers)
     blocks.append(Section(title="Coefficients", blocks=[Table(columns=columns, rows=rows, numeric=(1, 2, 3))]))
-    names = tuple(f"{c['name']}:" for c in numbers["coefficients"])  # what is said of them stands in the table
+    blocks += _forms(numbers)
+    names = tuple(f"{c['name']}:" for c in given)  # what is said of them stands in the table
     blocks += [Note(text=f"{as_sentence(text)}.") for text in remarks if not text.startswith(names)]
     return render(
         title="Ground law from recorded drops",
@@ -62,7 +73,30 @@ def _end(value: float | None) -> str:
 
 
 def _origin(c: Mapping[str, Any]) -> Cell:
-    return Cell("determined", "pass") if c["origin"] == "data" else Cell(f"not determined: {c['why']}", "warn")
+    if "origin" not in c:  # of a form, whose numbers are what its interval says
+        return Cell("")
+    if c["origin"] == "data":
+        return Cell("determined", "pass")
+    return Cell(f"not determined: {c['why']}", "warn")
+
+
+def _forms(numbers: Mapping[str, Any]) -> list[Block]:
+    """Forms that competed: how well each follows the drops it was fitted to, and those that were left out."""
+    rows: list[list[str | Cell]] = [
+        [
+            Cell(f["name"], "pass") if f["name"] == numbers["chosen"] else f["name"],
+            f["statement"],
+            percent(f["residual"]),
+            f"{f['log_scatter']:.2f}",
+            percent(f["held_out_deceleration_error"]),
+            percent(f["held_out_depth_error"]),
+        ]
+        for f in numbers.get("forms", ())
+    ]
+    if not rows:
+        return []
+    columns = ["form", "", "RMS / largest force", "scatter of ln F", "held-out deceleration", "held-out depth"]
+    return [Section(title="Forms that competed", blocks=[Table(columns=columns, rows=rows, numeric=(2, 3, 4, 5))])]
 
 
 def _curves(law: GroundLaw, numbers: Mapping[str, Any]) -> list[Block]:
