@@ -37,7 +37,7 @@ def scene(name: str) -> Scenario:
 
 @cache
 def recorded(name: str) -> Recording:
-    made = simulate.run(scene(name)).recording
+    made = simulate.run(scene(name).of_many()).recording  # by the integrator that predicts: another one parts from it
     return synthetic(made, channels=(*ANGLES, *QUATERNION), rate=150.0, seed=4)
 
 
