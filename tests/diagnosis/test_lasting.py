@@ -178,7 +178,7 @@ def test_with_what_leads_its_kin_gets_a_first_fit() -> None:
     """Six of the ground, three sensors; the last one of the ground is akin to the best one."""
     kinds = [("a", "depth"), ("b", "x"), ("c", "y"), ("d", "z"), ("e", "u"), ("f", "depth")]
     two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
-    every = [Candidate(id=i, kind="physics", family=f, search=two, neutral=(None, 0.5)) for i, f in kinds]
+    every = [Candidate(id=i, kind="physics", family=f, search=two, null=(None, 0.5)) for i, f in kinds]
     every += [Candidate(id=i, kind="sensor", family="depth", search={}) for i in ("g", "h", "i")]
     screened = [Screened(candidate=c, starts=(), left=float(k), potential=0.0) for k, c in enumerate(every)]
     looked = ScoreTest(score=9.0, scores={c.key: 9.0 - k for k, c in enumerate(every)}, null=np.zeros(9), detectable={})
@@ -191,7 +191,7 @@ def test_with_what_leads_its_kin_gets_a_first_fit() -> None:
     assert {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, loud)} == {"a", "b", "c", "d", "f", "g"}
     masked = replace(hopeless, leading=("c",))
     assert "c" in {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, masked)}
-    every[0] = replace(every[0], neutral=(0.5, 0.5))  # it acts everywhere
+    every[0] = replace(every[0], null=(0.5, 0.5))  # it acts everywhere
     assert of_same_family(every, 4, 2) == []
 
 
@@ -223,7 +223,7 @@ def test_a_rival_that_nothing_spoke_for_is_none() -> None:
     far = replace(looked, far={"inertia": ((0.9,),)})  # its runs did
     assert without_unsupported_rivals(step, far).rivals == (fits[0], fits[2])
     two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
-    placed = [Candidate(id=i, kind="physics", family="f", search=two, neutral=(None, 0.5)) for i in ("slope", "mass")]
+    placed = [Candidate(id=i, kind="physics", family="f", search=two, null=(None, 0.5)) for i in ("slope", "mass")]
     same_family = [Fitted(candidates=(c,), x=(0.5, 0.5), blocks=()) for c in placed]
     others = replace(step, rivals=(*same_family, fits[2]))
     assert without_unsupported_rivals(others, looked).rivals == tuple(same_family)
@@ -333,7 +333,7 @@ def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.
     asked.clear()
     assert told(7.9, 8.1)
     assert asked == [{}]  # beyond doubt
-    own = replace(candidate("ground-friction", "physics", "coefficient"), neutral=(0.5,))  # the scenario's is 0.5
+    own = replace(candidate("ground-friction", "physics", "coefficient"), null=(0.5,))  # the scenario's is 0.5
     fitted = Fitted(candidates=(own,), x=(0.6,), blocks=())
     for low, high, there in ((0.4, 0.6, False), (0.55, 0.7, True)):
         alone = [{"coefficient": _from(low, high)}]

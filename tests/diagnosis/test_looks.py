@@ -45,7 +45,7 @@ class Wave:
         return {CHANNEL: x * np.where(TIME < IMPACT, np.sin(30.0 * TIME), self.after * np.cos(90.0 * TIME))}
 
 
-SLOPE = Candidate(id="slope", kind="parameter", family="x", search={"angle": Search(-100.0, 100.0)}, neutral=(0.5,))
+SLOPE = Candidate(id="slope", kind="parameter", family="x", search={"angle": Search(-100.0, 100.0)}, null=(0.5,))
 
 
 def judge_of(
@@ -171,7 +171,7 @@ def test_a_look_says_where_an_effect_told_most() -> None:
 
 
 def test_the_best_two_scan_points_of_an_effect_start_fits() -> None:
-    placed = replace(SLOPE, neutral=(None,))
+    placed = replace(SLOPE, null=(None,))
     met = [(3.0, (0.1,)), (4.0, (0.9,)), (5.0, (0.5,)), (6.0, (0.3,))]
     assert _begun_at(placed, met) == ((0.1,), (0.9,))
 

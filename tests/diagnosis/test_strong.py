@@ -135,7 +135,7 @@ def test_a_strong_effect_is_fitted_robustly_compared_in_full() -> None:
         dataset.append(replace(quiet, signals=tuple(signals)))
     problem = Problem(dataset)
     problem.heavy_tailed = False
-    strength = replace(SLOPE, search={"angle": Search(0.0, 1.0)}, neutral=(0.0,))
+    strength = replace(SLOPE, search={"angle": Search(0.0, 1.0)}, null=(0.0,))
     task = Task(candidates=(strength,), start=(0.3,), shifts=(0.0, 0.0), only=(0, 1), fixed_shifts=True)
     with Executor() as executor:
         inquiry = Inquiry(
@@ -152,9 +152,9 @@ def test_a_strong_effect_is_fitted_robustly_compared_in_full() -> None:
 
 def test_an_effect_is_strong_at_each_end_of_its_range() -> None:
     assert SLOPE.strong() == [(0.58,), (0.42,), (0.5 - 0.175,), (0.5 - 0.45,), (0.5 + 0.175,), (0.5 + 0.45,)]
-    assert replace(SLOPE, neutral=None).strong() == []
+    assert replace(SLOPE, null=None).strong() == []
     tank = Candidate(
-        id="tank-slosh", kind="physics", family="x", neutral=(None, None),
+        id="tank-slosh", kind="physics", family="x", null=(None, None),
         search={"mass": Search(1.0, 1000.0, "log"), "length": Search(0.1, 1.0)},
     )  # fmt: skip
     places = tank.strong()
@@ -165,7 +165,7 @@ def test_an_effect_is_strong_at_each_end_of_its_range() -> None:
 
 def test_a_limit_starts_where_it_is_reached_despite_its_misfit() -> None:
     """Peaks of 20 N and a limit of 17 N; fits may begin beside the scenario's own of 30 N, or where 4 or 10 N yield."""
-    neutral, gives_way = 0.9, 0.3
+    null, gives_way = 0.9, 0.3
 
     class Yielding(Wave):
         def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
@@ -173,7 +173,7 @@ def test_a_limit_starts_where_it_is_reached_despite_its_misfit() -> None:
             return {CHANNEL: np.clip(20.0 * np.sin(30.0 * TIME), -limit, limit)}
 
     limit = Candidate(
-        id="rops-plasticity", kind="physics", family="x", search={"yield_force": Search(0.0, 33.0)}, neutral=(neutral,)
+        id="rops-plasticity", kind="physics", family="x", search={"yield_force": Search(0.0, 33.0)}, null=(null,)
     )  # fmt: skip
     problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
     simulator: Any = Yielding(0.0)
@@ -188,7 +188,7 @@ def test_a_limit_starts_where_it_is_reached_despite_its_misfit() -> None:
     )
     looked = replace(scan.look(problem, base, [limit], [[r] for r in range(4)]), far={})
     found = screen(inquiry, base, [limit], [0, 1], [0.0] * 4, looked)[0]
-    nothing_yields = [x for x in limit.probes() if abs(x[0] - neutral) < 0.1]
+    nothing_yields = [x for x in limit.probes() if abs(x[0] - null) < 0.1]
     assert nothing_yields
     assert found.left > sum(b.residual @ b.residual for b in blocks[:2])  # which is what these leave
-    assert found.starts == ((neutral + SETTINGS.fit.parameterisation.zero_step,), (gives_way,))
+    assert found.starts == ((null + SETTINGS.fit.parameterisation.zero_step,), (gives_way,))

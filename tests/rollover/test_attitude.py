@@ -222,7 +222,8 @@ def test_a_run_stays_on_one_branch_over_a_right_angle() -> None:
     """Rearing over, it pitches on; that roll and yaw are half a turn instead is a matter of rounding."""
     found = run("rear_overturn").recording
     assert np.ptp(found[PITCH]) > 2.5
-    assert max(float(np.abs(found[a]).max()) for a in (ROLL, YAW)) < 1e-3
+    # it falls back along a line that is unstable sideways: rounding grows, to 1.4 mrad here; half a turn is 3 rad
+    assert max(float(np.abs(found[a]).max()) for a in (ROLL, YAW)) < 0.05
     for pitch in (np.linspace(0.0, 4.0, 101), -np.linspace(0.0, 4.0, 401), np.radians(np.arange(0.0, 200.0, 45.0))):
         made = angles_of(np.array([rotation_vector(from_angles(0.0, p, math.pi)) for p in pitch]))
         np.testing.assert_allclose(np.column_stack(made), [[0.0, p, math.pi] for p in pitch], atol=1e-7)
@@ -268,7 +269,8 @@ def test_two_runs_are_compared_on_one_branch() -> None:
 
 
 def test_the_table_of_channels_knows_what_is_periodic() -> None:
-    assert {n for n, c in CHANNELS.items() if c.period is not None} == {*ANGLES, "axle/front/angle"}
+    behind = {f"trailer/{angle}" for angle in ("roll", "pitch", "yaw")}
+    assert {n for n, c in CHANNELS.items() if c.period is not None} == {*ANGLES, *behind, "axle/front/angle"}
     time = np.arange(200) / 100.0
     angle = 0.05 * np.sin(time * 9.0)
     made = Recording(title="pivot", time=time, channels={"axle/front/angle": angle % TURN})
