@@ -41,6 +41,7 @@ class Tyre:
     lateral_stiffness: Annotated[float, Quantity("N/m", "k_y, also of the stick spring", above=0)]
     lying_stiffness: Annotated[
         float | None,
+        Later(),
         Quantity("N/m", "of the tyre flat on its side, 3 k_y if held evenly; null: rigid side walls", above=0),
     ] = None
     friction: Annotated[float, Quantity("1", "mu between tyre and ground", least=0, most=2)] = 0.8
