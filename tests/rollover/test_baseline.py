@@ -202,7 +202,7 @@ def test_every_shipped_scenario_has_a_baseline_or_a_reason() -> None:
 
 
 def test_shipped_baselines_are_of_the_scenarios_as_they_are() -> None:
-    """A key that is added later takes no part in a hash until it is set (`Later`): no baseline is of another scenario."""
+    """A key that is added later is no part of a hash until it is set (`Later`): no baseline is of another scenario."""
     folder = document.shipped_folder() / "baselines"
     names = {path.stem for path in folder.glob("*.yaml")} - {"excluded"}
     of = {name: baselines.read(folder / f"{name}.yaml").scenario_hash for name in names}
