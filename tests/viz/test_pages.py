@@ -17,7 +17,7 @@ from rollover.proof.summary import tally
 from rollover.recording import Recording
 from rollover.studies.baseline import Answer, Difference
 from tests.rollover.diagnosed import overlays, sensor_at_fault
-from tests.viz import example
+from tests.viz import example, spoilt
 from tests.viz.browser import CHROMIUM, has_browser
 from tests.viz.html import Parts
 from tests.viz.test_proof_page import row
@@ -28,6 +28,8 @@ from viz.pages import pair as pair_page
 from viz.pages.page import render
 
 KINDS = ("run", "compare", "two runs", "diagnose", "prove", "regress", "study")
+EVERY = (*KINDS, *spoilt.PAGES)
+KEPT = Path(__file__).parents[2] / "out" / "pages"  # pictures, to be looked at
 HASH = "c0ffee" * 10 + "beef"
 PAPER = (179, 261)  # mm, what A4 leaves within its margins
 VERSIONS = {"rollover": "0.1.0", "exudyn": "1.13.6"}
@@ -35,6 +37,8 @@ VERSIONS = {"rollover": "0.1.0", "exudyn": "1.13.6"}
 
 def page_of(kind: str, folder: Path) -> str:
     """A page with everything on it, from made-up results."""
+    if kind in spoilt.PAGES:
+        return spoilt.PAGES[kind]("drop 1")
     if kind == "run":
         run = example.overturn()
         answer = {"scenario_hash": HASH, "versions": VERSIONS, "files": ["run.json"], "half_step": None}
@@ -75,7 +79,7 @@ def page_of(kind: str, folder: Path) -> str:
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("pages")
     found = {}
-    for kind in KINDS:
+    for kind in EVERY:
         found[kind] = folder / f"{kind.replace(' ', '_')}.html"
         found[kind].write_text(page_of(kind, folder), encoding="utf-8")
     return found
@@ -83,8 +87,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def test_all_share_one_look_and_say_what_they_rest_on(pages: dict[str, Path]) -> None:
     styles = set()
-    for kind, path in pages.items():
-        text = path.read_text(encoding="utf-8")
+    for kind in KINDS:
+        text = pages[kind].read_text(encoding="utf-8")
         parts = Parts(text)
         (style,) = re.findall(r"<style>(.*?)</style>", text, flags=re.DOTALL)
         styles.add(style)
@@ -95,6 +99,12 @@ def test_all_share_one_look_and_say_what_they_rest_on(pages: dict[str, Path]) ->
         assert re.search(r"(Scenario|Scenarios|Seal) <code>[0-9a-f]{64}( and [0-9a-f]{64})?</code>", footer), kind
         assert re.search(r"rollover \d+\.\d+\.\d+", footer), kind
     assert len(styles) == 1
+
+
+def kept(kind: str, name: str) -> Path:
+    """Where a picture of a kind of page is kept."""
+    KEPT.mkdir(parents=True, exist_ok=True)
+    return KEPT / f"{kind.replace(' ', '_')}-{name}"
 
 
 needs_browser = pytest.mark.skipif(not has_browser(), reason="no chromium with playwright")
@@ -111,7 +121,7 @@ def browser() -> Iterator[Any]:
 
 
 @needs_browser
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EVERY)
 def test_it_reads_without_a_script_and_without_a_network(kind: str, pages: dict[str, Path], browser: Any) -> None:
     context = browser.new_context(java_script_enabled=False, offline=True, viewport={"width": 420, "height": 800})
     tab = context.new_page()
@@ -127,6 +137,10 @@ def test_it_reads_without_a_script_and_without_a_network(kind: str, pages: dict[
         assert box is not None
         assert box["width"] > 100
         assert box["height"] > 15
+    kept(kind, "phone.png").write_bytes(tab.screenshot(full_page=True))
+    tab.set_viewport_size({"width": 1200, "height": 900})
+    kept(kind, "wide.png").write_bytes(tab.screenshot(full_page=True))
+    tab.set_viewport_size({"width": 420, "height": 800})
     # on a narrow screen tables scroll by themselves, the page does not
     wide = tab.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
     assert wide <= 1
@@ -134,7 +148,7 @@ def test_it_reads_without_a_script_and_without_a_network(kind: str, pages: dict[
 
 
 @needs_browser
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EVERY)
 def test_it_prints_in_full_on_light_paper(kind: str, pages: dict[str, Path], browser: Any, tmp_path: Path) -> None:
     width = round(PAPER[0] / 25.4 * 96)
     context = browser.new_context(color_scheme="dark", offline=True, viewport={"width": width, "height": 900})
@@ -155,6 +169,7 @@ def test_it_prints_in_full_on_light_paper(kind: str, pages: dict[str, Path], bro
     assert max(beyond, default=0.0) <= 1.0, "cut off at the edge of the paper"
     paper = tab.pdf(prefer_css_page_size=True)
     assert paper.startswith(b"%PDF")
+    kept(kind, "paper.pdf").write_bytes(paper)
     sheets = {tuple(round(float(x)) for x in m) for m in re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", paper)}
     assert sheets <= {(595, 842), (596, 842)}, "A4 in points"
     context.close()
@@ -174,7 +189,7 @@ BROKEN = """[...document.querySelectorAll("th, td.number")].flatMap(cell => {
 
 
 @needs_browser
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EVERY)
 def test_figures_and_captions_can_be_read_on_a_phone(kind: str, pages: dict[str, Path], browser: Any) -> None:
     context = browser.new_context(offline=True, viewport={"width": 390, "height": 800})
     tab = context.new_page()
@@ -192,7 +207,7 @@ def test_figures_and_captions_can_be_read_on_a_phone(kind: str, pages: dict[str,
 
 
 @needs_browser
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EVERY)
 def test_no_number_and_no_heading_is_broken_on_paper(kind: str, pages: dict[str, Path], browser: Any) -> None:
     width = round(PAPER[0] / 25.4 * 96)
     context = browser.new_context(offline=True, viewport={"width": width, "height": 900})
