@@ -99,13 +99,16 @@ def scenario_of(name: str | Path) -> Scenario:
     if not isinstance(vehicle, Vehicle) or len(vehicle.wheels) < 3:
         message = f"has no wheels to stand on, got {vehicle.name!r}; a vehicle with at least three"
         raise InputError(Fault(file=str(path), path="wheels", message=message))
-    return Scenario(
-        title=vehicle.name,
-        vehicle=vehicle,
-        ground=Ground(elements=Elements(length=1.0, width=1.0), law=Ye2006()),
-        initiation=Standing(),
-        simulation=Simulation(duration=1.0),
-    )
+    try:
+        return Scenario(
+            title=vehicle.name,
+            vehicle=vehicle,
+            ground=Ground(elements=Elements(length=1.0, width=1.0), law=Ye2006()),
+            initiation=Standing(),
+            simulation=Simulation(duration=1.0),
+        )
+    except ValueError as e:  # what its own file does not show: it does not stand
+        raise InputError(Fault(file=str(path), message=str(e).removeprefix("vehicle."))) from None
 
 
 def json_of(found: Stability, about: Mapping[str, Any] | None = None) -> dict[str, Any]:

@@ -78,6 +78,19 @@ def test_what_cannot_stand(name: str, says: str, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def test_a_vehicle_that_does_not_stand_is_refused_in_a_line(tmp_path: Path) -> None:
+    """What no value of its own shows: a pivot so far away that the axle holds nothing."""
+    path = tmp_path / "tall.yaml"
+    path.write_text(
+        "base: vehicles/utility_tractor.yaml\nfront_axle: {pivot: [2.25, 0.0, 6.0e+13]}\n", encoding="utf-8"
+    )
+    done = rollover(path, "--headings", 1, "--out", tmp_path / "out")
+    assert done.exit_code == 2, done.output
+    (line,) = done.output.strip().splitlines()
+    assert line.startswith(f"{path}: wheels: chassis with front_axle turns freely about x")
+    assert line.endswith("a further wheel off this axis")
+
+
 def test_scenario_and_table(tmp_path: Path) -> None:
     """A scenario's effects stay out, and it says so."""
     effect = "effects.tank-slosh.mass=100"
