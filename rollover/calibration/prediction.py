@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.calibration.calibrate import Calibration, Estimate
+from rollover.calibration.identifiability import Z95
 from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 K = TypeVar("K", bound=Hashable)
-NORMAL_95 = 1.959963984540054  # half of a 95 % interval, standard deviations
 
 
 def prediction_error(found: Calibration, curves: Callable[[Scenario], Mapping[K, Array]]) -> dict[K, Array]:
@@ -41,7 +41,7 @@ def prediction_error(found: Calibration, curves: Callable[[Scenario], Mapping[K,
 
 
 def _sigma(e: Estimate) -> float:
-    return (e.high - e.low) / (2.0 * NORMAL_95)
+    return (e.high - e.low) / (2.0 * Z95)
 
 
 def _step(e: Estimate) -> float:

@@ -30,6 +30,11 @@ class Channel:
 TURN = 2.0 * math.pi
 
 
+def _attitude(body: str) -> list[Channel]:
+    meaning = "ISO 8855, on one branch along a run"
+    return [Channel(name=f"{body}/{a}", unit="rad", meaning=meaning, period=TURN) for a in ("roll", "pitch", "yaw")]
+
+
 def _axes(name: str, unit: str, meaning: str, axes: str = "xyz") -> list[Channel]:
     return [Channel(name=f"{name}_{axis}", unit=unit, meaning=f"{meaning}, {axis}") for axis in axes]
 
@@ -74,9 +79,7 @@ CHANNELS: dict[str, Channel] = {
         Channel(name="striker/acceleration_z", unit="m/s2", meaning="world, coordinate acceleration"),
         *_axes("chassis/position", "m", "centre of mass, world"),
         *_axes("chassis/velocity", "m/s", "centre of mass, world"),
-        Channel(name="chassis/roll", unit="rad", meaning="ISO 8855, on one branch along a run", period=TURN),
-        Channel(name="chassis/pitch", unit="rad", meaning="ISO 8855, on one branch along a run", period=TURN),
-        Channel(name="chassis/yaw", unit="rad", meaning="ISO 8855, on one branch along a run", period=TURN),
+        *_attitude("chassis"),
         *_axes("chassis/angular_velocity", "rad/s", "body axes"),
         *_axes("chassis/acceleration", "m/s2", "centre of mass, body axes, coordinate acceleration"),
         *_axes("chassis/quaternion", "1", "attitude, body axes to world, scalar first", "wxyz"),
@@ -110,9 +113,7 @@ CHANNELS: dict[str, Channel] = {
         Channel(name="hitch/force", unit="N", meaning="through the hitch of a trailer, resultant"),
         Channel(name="hitch/moment", unit="N m", meaning="through the hitch of a trailer, resultant"),
         *_axes("hitch/angle", "rad", "turn of the trailer against the vehicle, rotation vector"),
-        Channel(name="trailer/roll", unit="rad", meaning="ISO 8855, on one branch along a run", period=TURN),
-        Channel(name="trailer/pitch", unit="rad", meaning="ISO 8855, on one branch along a run", period=TURN),
-        Channel(name="trailer/yaw", unit="rad", meaning="ISO 8855, on one branch along a run", period=TURN),
+        *_attitude("trailer"),
         Channel(name="suspension/NAME/travel", unit="m", meaning="of a sprung wheel, up from the design position"),
         Channel(name="suspension/NAME/force", unit="N", meaning="of spring, damper and stop on the vehicle, upward"),
         Channel(name="input/NAME/angle", unit="rad", meaning="prescribed: of the front wheels, or of a tilt table"),

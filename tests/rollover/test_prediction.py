@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rollover.calibration.calibrate import Calibration
-from rollover.calibration.prediction import NORMAL_95, prediction_error
+from rollover.calibration.identifiability import Z95
+from rollover.calibration.prediction import prediction_error
 
 T = np.linspace(0.0, 2.0, 21)
 VALUES, SIGMA = {"a": 3.0, "b": -1.0}, {"a": 0.2, "b": 0.5}
@@ -34,8 +35,8 @@ def calibration(rho: float, bounds: dict[str, tuple[float, float]]) -> Calibrati
         SimpleNamespace(
             path=name,
             value=value,
-            low=value - NORMAL_95 * SIGMA[name],
-            high=value + NORMAL_95 * SIGMA[name],
+            low=value - Z95 * SIGMA[name],
+            high=value + Z95 * SIGMA[name],
             bounds=bounds.get(name, WIDE),
         )
         for name, value in VALUES.items()

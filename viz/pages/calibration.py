@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import pchip_interpolate
 
 from rollover.calibration.calibrate import Calibration, Estimate, Score
+from rollover.calibration.identifiability import Z95
 from rollover.calibration.posterior import Posterior
-from rollover.calibration.prediction import NORMAL_95
 from rollover.comparison.misfit import Misfit
 from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table, as_sentence
 from viz.content.differences import differences_section
@@ -111,7 +111,7 @@ def _curves(curves: Sequence[tuple[Misfit, Misfit]], open_by: Mapping[tuple[str,
             if now is not None:
                 simulated = np.interp(was.time, now.time, now.simulated)
                 sigma = open_by.get((before.recording, was.channel))
-                wide = None if sigma is None or sigma.shape != now.time.shape else NORMAL_95 * s.factor * sigma
+                wide = None if sigma is None or sigma.shape != now.time.shape else Z95 * s.factor * sigma
                 spread = None if wide is None else np.interp(was.time, now.time, wide)
                 curve = Curve(name="after", x=was.time, y=simulated * s.factor, spread=spread)
             svg = plots.before_after(

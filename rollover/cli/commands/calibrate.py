@@ -110,11 +110,11 @@ def calibrate(
         options = [*_options(fit, hold_out), *(["--profile", str(profile)] if profile else [])]
         options += ["--posterior", "--draws", str(draws)] if posterior else []
         command = " ".join(map(shlex.quote, ["rollover", "calibrate", scenario, *recordings, *options]))
-        curves = _curves(chosen, found, request.recordings)
+        curves, open_by = _curves(chosen, found, request.recordings)
         text = page(
             found,
             curves=curves,
-            open_by=_open_by(found, request.recordings) if curves else {},
+            open_by=open_by,
             command=command,
             scenario_hash=about["scenario_hash"],
             versions=results.versions(),
@@ -126,17 +126,19 @@ def calibrate(
         console.calibration(found, str(folder))
 
 
-def _curves(chosen: Scenario, found: Calibration, recordings: Mapping[str, Recording]) -> list[tuple[Misfit, Misfit]]:
-    """Each recording against the scenario before and after."""
+def _curves(
+    chosen: Scenario, found: Calibration, recordings: Mapping[str, Recording]
+) -> tuple[list[tuple[Misfit, Misfit]], Mapping[tuple[str, str], NDArray[np.float64]]]:
+    """Each recording against the scenario before and after, and how far the fitted values leave the latter open."""
     from rollover.cli import console
     from rollover.comparison.compared import compared
 
     try:
         before, after = (compared(each, recordings).misfits for each in (chosen, found.calibrated))
+        return list(zip(before, after, strict=True)), _open_by(found, recordings)
     except InputError as e:  # the fit stands; what cannot be rated is not drawn
         console.say(f"{PAGE} is without curves before and after: {e.faults[0]}")
-        return []
-    return list(zip(before, after, strict=True))
+        return [], {}
 
 
 def _open_by(found: Calibration, recordings: Mapping[str, Recording]) -> dict[tuple[str, str], NDArray[np.float64]]:
