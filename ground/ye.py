@@ -16,6 +16,7 @@ from ground.law import BRANCH, HIDDEN, MASS, REFERENCE_AREA, REFERENCE_MASS, SPE
 from ground.quantity import Quantity, parameters
 
 MULTIPLE_CORRELATION = 0.923
+BEFORE = 0.999  # of the sinkage where the branches cross: K_b1 is the less there, far beyond rounding; spares a power
 _K1, _C2 = HIDDEN, HIDDEN + 1  # hidden states: K_b1 and the coefficient of K_b2, worked out once for each touch
 _SCALE, _A1, _N1, _B1, _A2, _N2, _Q2 = 1, 2, 3, 4, 5, 6, 7  # places of the fields in p
 
@@ -52,6 +53,8 @@ class Ye2006(GroundLaw):
         """K' z, eq (3), with K' = min(K_b1, K_b2); z K_b2 is finite at z -> 0 though K_b2 is not."""
         if z <= 0.0:
             return 0.0
+        if p[_N2] < 0.0 and z < BEFORE * s[BRANCH]:
+            return s[_K1] * z
         return min(s[_K1] * z, s[_C2] * z ** (1.0 + p[_N2]))
 
     @property
