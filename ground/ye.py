@@ -12,11 +12,10 @@ import math
 from typing import Annotated, Literal
 
 from ground.compiled import begin_law, force_law
-from ground.law import BRANCH, HIDDEN, MASS, REFERENCE_AREA, REFERENCE_MASS, SPEED, Domain, GroundLaw
+from ground.law import BEFORE, BRANCH, HIDDEN, MASS, REFERENCE_AREA, REFERENCE_MASS, SPEED, Domain, GroundLaw
 from ground.quantity import Quantity, parameters
 
 MULTIPLE_CORRELATION = 0.923
-BEFORE = 0.999  # of the sinkage where the branches cross: K_b1 is the less there, far beyond rounding; spares a power
 _K1, _C2 = HIDDEN, HIDDEN + 1  # hidden states: K_b1 and the coefficient of K_b2, worked out once for each touch
 _SCALE, _A1, _N1, _B1, _A2, _N2, _Q2 = 1, 2, 3, 4, 5, 6, 7  # places of the fields in p
 
