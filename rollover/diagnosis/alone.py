@@ -18,6 +18,7 @@ from rollover.diagnosis.probabilities import credible, log_evidence
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import Explanation, kind_of
+from rollover.diagnosis.selection.ensemble_validation import restarted_base
 from rollover.diagnosis.selection.forward_step import by_chance, confusion, ends_at_bound, step
 from rollover.diagnosis.selection.scan import look
 from rollover.diagnosis.selection.stepwise import with_conditions_refitted
@@ -33,7 +34,8 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
     It is looked for though the discrepancy may be enough: that was estimated from what an effect leaves as well.
     """
     problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
-    base = with_time_shift_search(problem, base)
+    clocked = restarted_base if problem.effort.is_ensemble else with_time_shift_search
+    base = clocked(problem, base)
     before = mismatch_of(problem.dataset, base.blocks, phases)
     looked = look(problem, base, inquiry.candidates, groups, parallel_map=inquiry.executor.parallel_map)
     first = step(inquiry, base, looked)
