@@ -33,6 +33,8 @@ from rollover.recording.attitude import continuous
 from rollover.scenario import Scenario
 from rollover.spec.vehicle import Striker
 
+COMMON = "what {} references have in common was taken off each channel, as far as each of them repeats the others"
+
 
 def diagnose(
     scenario: Scenario,
@@ -97,6 +99,7 @@ def diagnose(
     if reference:
         every, learned = _learned_from_references(scenario, every, reference)
         asked = replace(asked, discrepancy=learned)
+        notes += [COMMON.format(learned.taught_by)] if learned is not None and learned.taught_by else []
     if stated:
         asked = replace(asked, discrepancy=Discrepancy(scales=stated))
     if asked.discrepancy is not None:

@@ -100,7 +100,13 @@ def reported(c: Conclusion) -> Diagnosis:
             if shown is not None
             else immaterial_sentence(c.slight)
             if c.slight
-            else usual_model_error_sentence(asked.discrepancy.scales, explanation.p_value, len(found), _most(c))
+            else usual_model_error_sentence(
+                asked.discrepancy.scales,
+                explanation.p_value,
+                len(found),
+                _most(c),
+                taught=asked.discrepancy.is_taught,
+            )
             if verdict == "no-mismatch" and asked.discrepancy is not None and c.is_beside
             else sentence(
                 verdict,
@@ -117,7 +123,7 @@ def reported(c: Conclusion) -> Diagnosis:
         )
         + (closest_candidate_sentence(explanation, groups) if verdict == "unexplained" and shown is None else "")
         + (clock_evidence(clock_outliers(problem, explanation.fitted, executor.parallel_map)) if is_left else "")
-        + (by_share(effects, shares, estimated=c.is_beside) if shown is None else "")
+        + (by_share(effects, shares, estimated=c.is_estimated) if shown is None else "")
         + offered(law)
         + inconsistency_evidence(c.inconsistencies)
         + contradiction_clause(verdict, contrary)

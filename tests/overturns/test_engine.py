@@ -126,3 +126,5 @@ def test_a_case_is_recorded_by_the_other_engine(
     assert [e["id"] for e in case.truth["effects"]] == list(ids)
     assert all(tuple(r.channels) == CHANNELS for r in case.recordings)
     assert all(e["over_noise"] > 0.0 for e in case.truth["effects"])
+    assert len(case.references) == generator.REFERENCES
+    assert not any(r.conditions == one.conditions for r in case.references for one in case.recordings)

@@ -35,7 +35,8 @@ class Discrepancy:
     times: Mapping[str, float] = field(default_factory=dict)
     by_none: Mapping[str, float] = field(default_factory=dict)
     taught_by: int = 0  # references whose common course was taken off, so that the rest is new in each recording
-    is_estimated: bool = False  # by what explanations leave of the recordings themselves: neither stated nor taught
+    is_estimated: bool = False  # by what explanations leave of the recordings themselves
+    is_taught: bool = False  # by recordings in which nothing is missing
 
     @property
     def is_usual(self) -> bool:
@@ -120,7 +121,8 @@ def learned_from_references(problem: Problem, base: Fitted) -> Discrepancy | Non
         for s in e.signals
         for key, _ in stretches(e, s)
     )
-    return Discrepancy(scales=scales, times=correlation_times(problem, base), by_none=left) if shows else None
+    times = correlation_times(problem, base)
+    return Discrepancy(scales=scales, times=times, by_none=left, is_taught=True) if shows else None
 
 
 def correlation_times(problem: Problem, fitted: Fitted) -> dict[str, float]:
