@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from rollover.diagnosis import io
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.data.stretches import BEFORE, before, channel_of, onset, parted
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
@@ -30,6 +32,7 @@ from rollover.diagnosis.noise.autoregression import with_noise, with_own_model_e
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from rollover.recording import Recording
+from rollover.recording.importers import write_recording
 
 Array = NDArray[np.float64]
 ROLL, RATE = "chassis/roll", "chassis/angular_velocity_x"
@@ -188,6 +191,20 @@ def test_what_is_left_of_a_taught_course_is_new_each_time(taught: int, times: fl
     problem = held_against(recorded([wave(0, 0.0, 0.0)] * 4), Discrepancy(scales=scales, taught_by=taught))
     assert problem.samples_per_error > 1.0
     assert problem.samples_per_draw == pytest.approx(times * problem.samples_per_error)
+
+
+def test_a_folder_says_by_names_which_are_references(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("r1", "r2", "reference1", "reference2"):
+        write_recording(Recording(title=name, time=TIME, channels={ROLL: TIME}), tmp_path / f"{name}.parquet")
+    seen: list[Any] = []
+
+    def kept(_: object, recordings: Sequence[tuple[str, Recording]], *, reference: Sequence[str], **__: object) -> None:
+        seen.append(([name for name, _ in recordings], list(reference)))
+
+    for name, stand_in in (("diagnose", kept), ("load", lambda _: None), ("json_of", lambda _: {})):
+        monkeypatch.setattr(io, name, stand_in)
+    assert io.diagnose_folder(tmp_path) == {}
+    assert seen == [(["r1", "r2", "reference1", "reference2"], ["reference1", "reference2"])]
 
 
 def test_a_discrepancy_begins_with_the_impact_of_a_run() -> None:
