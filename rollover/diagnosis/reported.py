@@ -71,6 +71,7 @@ def reported(c: Conclusion) -> Diagnosis:
         law = proposed(problem, explanation.base, set_ups, found, groups)
     told_of = {} if asked.discrepancy is None else asked.discrepancy.scales_by_channel(found)
     shares = {} if asked.discrepancy is None else {k: asked.discrepancy.scales[k] for k in told_of}
+    is_taught = asked.discrepancy is not None and asked.discrepancy.is_taught
     detectable = dict(explanation.detectable)
     contrary = inconsistent_repeats(found, SETTINGS.data.repeatability.contradiction)
     if verdict == "no-mismatch" and not c.slight and (contrary or is_weak(detectable)):
@@ -105,7 +106,7 @@ def reported(c: Conclusion) -> Diagnosis:
                 explanation.p_value,
                 len(found),
                 _most(c),
-                taught=asked.discrepancy.is_taught,
+                taught=is_taught,
             )
             if verdict == "no-mismatch" and asked.discrepancy is not None and c.is_beside
             else sentence(
@@ -127,7 +128,7 @@ def reported(c: Conclusion) -> Diagnosis:
         + offered(law)
         + inconsistency_evidence(c.inconsistencies)
         + contradiction_clause(verdict, contrary)
-        + tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found)
+        + tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found, taught=is_taught)
         + no_contact_clause(found),
         p_value=explanation.p_value if shown is None else shown.p_value,
         noise=noise(found),

@@ -16,7 +16,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
-from rollover.diagnosis.result import Considered, Named, Place, Score, Share, Verdict
+from rollover.diagnosis.result import Considered, Diagnosis, Named, Place, Score, Share, Verdict
 from rollover.diagnosis.selection.decision import Explanation, strongest
 from rollover.diagnosis.selection.forward_step import confusion
 from rollover.diagnosis.settings import SETTINGS
@@ -267,18 +267,43 @@ def noise(dataset: Sequence[Dataset]) -> dict[str, float]:
     return {name: float(np.median(values)) for name, values in found.items()}
 
 
-def tolerance_clause(verdict: Verdict, p_value: float, score: Score | None, dataset: Sequence[Dataset]) -> str:
-    """What a sentence goes on with where curves that a stated tolerance lets pass are poor by ISO/TS 18571."""
+def is_hardly_tolerated(found: Diagnosis) -> bool:
+    """Whether what passes is larger than noise and tolerance, by no more than chance, or is poor by ISO/TS 18571.
+
+    A fault that recordings show by themselves is named already.
+    """
+    score = found.before.get("held_out")
+    if found.verdict != "no-mismatch" or found.by_itself or score is None:
+        return False
+    return score.nrmse > 1.0 or (score.iso18571 is not None and grade(score.iso18571) == "poor")
+
+
+def tolerance_clause(
+    verdict: Verdict, p_value: float, score: Score | None, dataset: Sequence[Dataset], *, taught: bool = False
+) -> str:
+    """What a sentence goes on with where a stated tolerance lets pass poor curves, or a peak force that is off by more.
+
+    Poor is what ISO/TS 18571 calls so. `taught` says that references told what is tolerated.
+    """
     is_beyond_noise = verdict == "no-mismatch" and p_value < SETTINGS.inference.lack_of_fit.p_value
-    iso = None if score is None else score.iso18571
-    if not is_beyond_noise or iso is None or grade(iso) != "poor":
+    if not is_beyond_noise or score is None:
         return ""
-    if not any(e.model_error_dominates(s) for e in dataset for s in e.signals):
+    tolerated = [e.model_error_of(s) for e in dataset for s in e.signals if e.model_error_dominates(s)]
+    if not tolerated:
         return ""
-    return (
-        f" By ISO 18571 they are poor ({iso:.2f}): what is tolerated may hide an effect; a smaller --tolerance,"
-        " or values known better than their stated uncertainty, would show it."
+    iso, peak = score.iso18571, score.peak_force_error or 0.0
+    if iso is not None and grade(iso) == "poor":
+        shown = f"By ISO 18571 they are poor ({iso:.2f})"
+    elif abs(peak) > max(tolerated):
+        shown = f"A peak force is off by {abs(peak):.0%}"
+    else:
+        return ""
+    cure = (
+        "a model that meets the references better, or more of them,"
+        if taught
+        else "a smaller --tolerance, or values known better than their stated uncertainty,"
     )
+    return f" {shown}: what is tolerated may hide an effect; {cure} may show it."
 
 
 def sentence(
