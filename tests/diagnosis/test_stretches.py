@@ -118,6 +118,12 @@ def test_each_side_of_the_impact_has_its_own_scale(early: float, late: float) ->
         assert channel_of(key) == ROLL
 
 
+def test_what_is_tolerated_of_a_channel_bounds_both_sides() -> None:
+    found = Discrepancy(scales={before(ROLL): 0.03, ROLL: 0.2, before(RATE): 0.03}).at_most({ROLL: 0.05})
+    assert found.scales == {before(ROLL): 0.03, ROLL: 0.05, before(RATE): 0.03}
+    assert found.at_most({ROLL: 0.02}).scales[before(ROLL)] == 0.02
+
+
 def test_a_part_of_a_channel_is_held_against_its_own_scale() -> None:
     scales = {before(ROLL): 0.01, ROLL: 0.2, RATE: 0.1}
     (whole,) = recorded([wave(0, 0.0, 0.0)])
