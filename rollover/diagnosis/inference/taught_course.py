@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.stretches import onset, stretches
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-LEAST = 3  # references: of two each would be predicted by one other alone, which tells no mean from what is its own
+TUNING = SETTINGS.inference.discrepancy
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +77,7 @@ def mean_course(courses: Sequence[Course], since: Array, predicted: Array) -> Ar
 
 def taught_by(problem: Problem, base: Fitted) -> tuple[Taught, Problem] | None:
     """What references teach, and these without what each repeats of the others; None where they repeat nothing."""
-    if len(problem.dataset) < LEAST:
+    if len(problem.dataset) < TUNING.least_references:
         return None
     courses: list[dict[str, Course]] = []
     for e, block, left in zip(problem.dataset, base.blocks, problem.residuals(base), strict=True):
