@@ -38,8 +38,8 @@ from rollover.spec.vehicle import Striker
 COMMON = "what {} references have in common was taken off each channel, as far as each of them repeats the others"
 HALF = SETTINGS.report.grades.half_share
 WITHIN_TOLERANCE = (
-    "the tolerance alone lets these curves pass; it is the most that a scenario may miss them by, and what is named"
-    " surely predicts half of the mismatch on conditions held out"
+    "the tolerance is the most that a scenario may miss the curves by: beside an error of its size nothing is named;"
+    " what is named surely predicts half of the mismatch on conditions held out"
 )
 
 
@@ -59,12 +59,13 @@ def diagnose(
 
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
     out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss
-    it, of all or by channel: what is smaller is none. Where it passes by chance alone or curves are poor, it bounds a
-    discrepancy that is estimated, and what surely predicts half of the mismatch is named (of drops). `reference` names
-    recordings of the same rig in which nothing is suspected: they teach how far it misses, and are not diagnosed. With
-    `estimate` that is estimated where nothing explains the recordings (see `inference.discrepancy`), and the answer
-    beside it is given where it says more: if it is "unexplained" in place of that verdict alone, where neither of the
-    others is stated; if it is True what the estimate makes doubtful is not named either.
+    it, of all or by channel: what is smaller is none. Where nothing explains what is larger, it passes by chance alone
+    or curves are poor, that bounds a discrepancy that is estimated, and what surely predicts half of the mismatch is
+    named (of drops). `reference` names recordings of the same rig in which nothing is suspected: they teach how far it
+    misses, and are not diagnosed. With `estimate` that is estimated where nothing explains the recordings (see
+    `inference.discrepancy`), and the answer beside it is given where it says more: if it is "unexplained" in place of
+    that verdict alone, where neither of the others is stated; if it is True what the estimate makes doubtful is not
+    named either.
     `posterior` draws of the numbers of what is named are made, of drops only.
     `executor` works off the fits, in children if it has any; the answer is the same. Raises `InputError` for an
     unknown condition, a clock that nothing tells the zero of, and recordings without any channel that is simulated;
@@ -122,7 +123,8 @@ def diagnose(
         if found.verdict == "unexplained" and doubtful is not None:
             found = _second_opinion(doubtful, usable, notes) or found
     bounds = stated or (dict.fromkeys(channels, general) if general > 0.0 else {})
-    if estimate and not reference and bounds and is_hardly_tolerated(found):
+    is_open = found.verdict == "unexplained" or is_hardly_tolerated(found)
+    if estimate and not reference and bounds and is_open:
         left = {e.name for e in usable}
         bare = without_inconsistent([e for e in exact if e.name in left], some)
         found = _within_tolerance(replace(asked, bounds=bounds), bare, [*some, *wrong], notes) or found
