@@ -103,8 +103,22 @@ class Conclusion:
 
     @property
     def is_beside(self) -> bool:
+        """Whether it was drawn beside a discrepancy that was estimated, or of full runs taught."""
+        return is_beside(self.asked, self.problem)
+
+    @property
+    def is_estimated(self) -> bool:
         """Whether it was drawn beside a discrepancy that was estimated."""
         return self.asked.discrepancy is not None and self.asked.discrepancy.is_estimated
+
+
+def is_beside(asked: Asked, problem: Problem) -> bool:
+    """Whether one effect is looked for, beside a discrepancy that was estimated, or of full runs taught.
+
+    A stated one is a bound: within it nothing is looked for.
+    """
+    known = asked.discrepancy
+    return known is not None and (known.is_estimated or (known.is_taught and problem.effort.is_ensemble))
 
 
 def concluded(
@@ -167,21 +181,22 @@ def weighed(
     """
     problem, groups, phases, recordings = inquiry.problem, inquiry.groups, inquiry.phases, asked.recordings
     found, notes = list(problem.dataset), list(notes)
-    is_beside = asked.discrepancy is not None and asked.discrepancy.is_estimated
-    if is_beside:
+    beside = is_beside(asked, problem)
+    is_taught = asked.discrepancy is not None and asked.discrepancy.is_taught
+    if beside:
         explanation = tried = fit_single_effect(inquiry, base)
     else:
         explanation = tried = explained(inquiry, base)
 
     def decide(found: Explanation) -> tuple[Explanation, Verdict]:
         return (
-            verdict_on_single_effect(problem, found, groups)
-            if is_beside
+            verdict_on_single_effect(problem, found, groups, is_taught=is_taught)
+            if beside
             else verdict_on(problem, found, groups, phases)
         )
 
     def name_all(found: Explanation, verdict: str) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
-        alike = partial(alike_beside, problem, groups=groups) if is_beside else None
+        alike = partial(alike_beside, problem, groups=groups) if beside else None
         return _refitted_explanation(problem, found, verdict, validation, groups, phases, alike)
 
     explanation, verdict = decide(explanation)
@@ -206,13 +221,13 @@ def weighed(
     effects = clear_of_null(problem, explanation, effects) if asked.estimates else effects
     found = list(problem.dataset)
     # beside a discrepancy what is met is no more than that and noise: what is surely predicted all the same is more
-    is_open = asked.estimates and verdict == "unexplained" and not is_beside
+    is_open = asked.estimates and verdict == "unexplained" and not beside
     if is_open and is_noise_alone(problem, explanation, groups):
         verdict = "no-mismatch"
         notes.append(AS_NOISE)
-    enough = is_tolerated if is_beside else partial(is_enough, left=explanation.after)
+    enough = is_tolerated if beside else partial(is_enough, left=explanation.after)
     left = not enough(problem, explanation.fitted)
-    grade, effects = graded(*with_shares(problem, explanation, effects, groups), is_beside=is_beside, remains=left)
+    grade, effects = graded(*with_shares(problem, explanation, effects, groups), is_beside=beside, remains=left)
     slight = effects if asked.estimates and grade == "immaterial" else ()
     if asked.estimates and (slight or (effects and grade == "unexplained")):
         verdict, effects, explanation = "no-mismatch" if slight else "unexplained", (), explanation.refused()

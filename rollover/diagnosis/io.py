@@ -22,6 +22,7 @@ from rollover.spec.document import dump
 FORMAT = "rollover-diagnosis/1"
 JSON, SCENARIO, PAGE, PICTURE = "diagnosis.json", "scenario-diagnosed.yaml", "report.html", "diagnosis.rrd"
 DRAWS = "posterior.csv"
+REFERENCE = "reference"  # what the names of references begin with
 FILES = (JSON, SCENARIO, PAGE, PICTURE, DRAWS)
 
 
@@ -149,7 +150,12 @@ def recordings_in(folder: Path) -> list[tuple[str, Recording]]:
 
 
 def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
-    """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says."""
+    """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says.
+
+    Those whose names begin with "reference" are references, see `diagnose`.
+    """
     del out
+    recordings = recordings_in(folder)
+    taught = [name for name, _ in recordings if name.startswith(REFERENCE)]
     with Executor(workers) as executor:
-        return json_of(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), executor=executor))
+        return json_of(diagnose(load(folder / "scenario.yaml"), recordings, reference=taught, executor=executor))

@@ -19,6 +19,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.time_shift import align, clock_outliers, is_explained_by_clocks
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference.discrepancy import Discrepancy, estimated, learned_from_references, with_discrepancy
+from rollover.diagnosis.inference.taught_course import taught_by
 from rollover.diagnosis.inference.wrong_condition import wrong_conditions
 from rollover.diagnosis.invariants import checked
 from rollover.diagnosis.late_clocks import with_clock_finding
@@ -34,6 +35,7 @@ from rollover.recording.attitude import continuous
 from rollover.scenario import Scenario
 from rollover.spec.vehicle import Striker
 
+COMMON = "what {} references have in common was taken off each channel, as far as each of them repeats the others"
 HALF = SETTINGS.report.grades.half_share
 WITHIN_TOLERANCE = (
     "the tolerance is the most that a scenario may miss the curves by: beside an error of its size nothing is named;"
@@ -97,6 +99,7 @@ def diagnose(
     if reference:
         every, learned = _learned_from_references(scenario, every, reference)
         asked = replace(asked, discrepancy=learned)
+        notes += [COMMON.format(learned.taught_by)] if learned is not None and learned.taught_by else []
     if stated:
         asked = replace(asked, discrepancy=Discrepancy(scales=stated))
     if asked.discrepancy is not None:
@@ -195,7 +198,7 @@ def _beside_estimated_discrepancy(
 ) -> Diagnosis | None:
     """The diagnosis beside a discrepancy as large as what explanations leave says; None if it says no more."""
     asked, tried = found.asked, found.tried
-    if asked.discrepancy is not None or found.acts != "drop":
+    if asked.discrepancy is not None:
         return None
     several = [tried.fitted] if len(tried.fitted.candidates) > 1 else []
     learned = estimated(found.problem, tried.base, [*_rivals(tried), *several]).at_most(asked.bounds)
@@ -220,8 +223,8 @@ def _beside_estimated_discrepancy(
 def _is_reproduced(found: Conclusion) -> bool:
     """Whether what nothing explains carries over to recordings that were held out, by its course or by a law."""
     problem, scenario = found.problem, found.asked.scenario
-    if scenario is None:
-        return False
+    if scenario is None or found.acts != "drop":
+        return False  # nothing predicts the course of an overturn but a run
     if repeats_its_course(problem, found.explanation.base, found.groups):
         return True
     scenarios = [set_up(scenario, e.recording) for e in problem.dataset]
@@ -236,15 +239,27 @@ def _rivals(tried: Explanation) -> tuple[Fitted, ...]:
 def _learned_from_references(
     scenario: Scenario, every: Sequence[Dataset], reference: Sequence[str]
 ) -> tuple[list[Dataset], Discrepancy | None]:
-    """The recordings that are no references, and what these teach of the discrepancy; None if noise hides it."""
+    """The recordings that are no references, without what these have in common, and what else these miss.
+
+    None where noise hides that.
+    """
+    others = [e for e in every if e.name not in reference]
     usable = [e for e in every if e.name in reference]
-    learned = None
-    if usable:
-        problem = Problem(weighted_datasets(scenario, usable))
-        align(problem)
-        base = problem.fit((), ())
-        learned = None if base is None else learned_from_references(problem, base)
-    return [e for e in every if e.name not in reference], learned
+    if not usable:
+        return others, None
+    problem = Problem(weighted_datasets(scenario, usable))
+    align(problem)
+    base = problem.fit((), ())
+    if base is None:
+        return others, None
+    taught = taught_by(problem, base)
+    if taught is None:
+        return others, learned_from_references(problem, base)
+    common, rest = taught
+    learned = learned_from_references(rest, rest.again(base))
+    if learned is not None:
+        learned = replace(learned, taught_by=common.count)
+    return [common.without(e) for e in others], learned
 
 
 def _with_clocks_corrected(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]) -> Diagnosis | None:

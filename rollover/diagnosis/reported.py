@@ -71,6 +71,7 @@ def reported(c: Conclusion) -> Diagnosis:
         law = proposed(problem, explanation.base, set_ups, found, groups)
     told_of = {} if asked.discrepancy is None else asked.discrepancy.scales_by_channel(found)
     shares = {} if asked.discrepancy is None else {k: asked.discrepancy.scales[k] for k in told_of}
+    is_taught = asked.discrepancy is not None and asked.discrepancy.is_taught
     detectable = dict(explanation.detectable)
     contrary = inconsistent_repeats(found, SETTINGS.data.repeatability.contradiction)
     if verdict == "no-mismatch" and not c.slight and (contrary or is_weak(detectable)):
@@ -100,7 +101,13 @@ def reported(c: Conclusion) -> Diagnosis:
             if shown is not None
             else immaterial_sentence(c.slight)
             if c.slight
-            else usual_model_error_sentence(asked.discrepancy.scales, explanation.p_value, len(found), _most(c))
+            else usual_model_error_sentence(
+                asked.discrepancy.scales,
+                explanation.p_value,
+                len(found),
+                _most(c),
+                taught=is_taught,
+            )
             if verdict == "no-mismatch" and asked.discrepancy is not None and c.is_beside
             else sentence(
                 verdict,
@@ -117,11 +124,11 @@ def reported(c: Conclusion) -> Diagnosis:
         )
         + (closest_candidate_sentence(explanation, groups) if verdict == "unexplained" and shown is None else "")
         + (clock_evidence(clock_outliers(problem, explanation.fitted, executor.parallel_map)) if is_left else "")
-        + (by_share(effects, shares, estimated=c.is_beside) if shown is None else "")
+        + (by_share(effects, shares, estimated=c.is_estimated) if shown is None else "")
         + offered(law)
         + inconsistency_evidence(c.inconsistencies)
         + contradiction_clause(verdict, contrary)
-        + tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found)
+        + tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found, taught=is_taught)
         + no_contact_clause(found),
         p_value=explanation.p_value if shown is None else shown.p_value,
         noise=noise(found),
