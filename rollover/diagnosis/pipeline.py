@@ -124,7 +124,7 @@ def diagnose(
             found = _second_opinion(doubtful, usable, notes) or found
     bounds = stated or (dict.fromkeys(channels, general) if general > 0.0 else {})
     is_open = found.verdict == "unexplained" or is_hardly_tolerated(found)
-    if estimate and not reference and bounds and is_open:
+    if estimate and not reference and bounds and is_open and not unfit(scenario):
         left = {e.name for e in usable}
         bare = without_inconsistent([e for e in exact if e.name in left], some)
         found = _within_tolerance(replace(asked, bounds=bounds), bare, [*some, *wrong], notes) or found
