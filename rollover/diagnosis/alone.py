@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rollover.diagnosis.fit.cross_validation import held_out
+from rollover.diagnosis.fit.cross_validation import Groups, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import with_time_shift_search
-from rollover.diagnosis.fit.step import Groups, Step
+from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.grades import jackknifed, share_beyond, share_of, shares
 from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
@@ -16,7 +16,6 @@ from rollover.diagnosis.inference.repeated_course import predicted_by_others, qu
 from rollover.diagnosis.inference.residual_law import fitted_law
 from rollover.diagnosis.probabilities import credible, log_evidence
 from rollover.diagnosis.result import Verdict
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import Explanation, kind_of
 from rollover.diagnosis.selection.forward_step import by_chance, confusion, ends_at_bound, step
 from rollover.diagnosis.selection.scan import look

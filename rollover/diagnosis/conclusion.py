@@ -11,11 +11,12 @@ from rollover.diagnosis.data.dataset import Dataset, left_out, with_uncertain_co
 from rollover.diagnosis.data.inconsistent import Aside, inconsistency_evidence
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.data.repeatability import inconsistent_repeats
+from rollover.diagnosis.fit.cross_validation import Groups
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import has_uncertain_conditions, refitted_with_conditions
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Groups, Step
+from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.grades import graded, with_shares
@@ -31,7 +32,6 @@ from rollover.diagnosis.power import cannot_tell
 from rollover.diagnosis.prepared import weighted_datasets
 from rollover.diagnosis.result import Answer, Diagnosis, Named, Verdict
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import (
     Explanation,
     by_first_effect,

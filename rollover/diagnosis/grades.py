@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.cross_validation import held_out
+from rollover.diagnosis.fit.cross_validation import Groups, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, with_slices
-from rollover.diagnosis.fit.step import Groups
 from rollover.diagnosis.result import Answer, Named, Share, Verdict
 from rollover.diagnosis.selection.decision import Explanation
 from rollover.diagnosis.settings import SETTINGS

@@ -8,10 +8,10 @@ from math import isfinite
 
 import numpy as np
 
-from rollover.diagnosis.fit.cross_validation import held_out
+from rollover.diagnosis.data.phases import Phases
+from rollover.diagnosis.fit.cross_validation import Groups, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import coordinate, physical, strength_parameter
-from rollover.diagnosis.fit.step import Groups, Phases
 from rollover.diagnosis.inference.intervals import held_at
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.result import Diagnosis, Named

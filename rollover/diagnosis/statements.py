@@ -9,11 +9,11 @@ import numpy as np
 
 from rollover.comparison.rating import grade
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.cross_validation import Held, held_out
+from rollover.diagnosis.fit.cross_validation import Groups, Held, held_out
 from rollover.diagnosis.fit.ensemble_mean import refined_by_ensemble_mean
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Groups, Step
+from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
 from rollover.diagnosis.result import Considered, Named, Place, Score, Share, Verdict

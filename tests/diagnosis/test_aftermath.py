@@ -13,11 +13,11 @@ from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Inquiry
 from rollover.diagnosis.forward.averaging import Averaged
 from rollover.diagnosis.forward.full_run import RunSimulator
 from rollover.diagnosis.noise.truncation import shortened, shortly_after_impact, truncation_notes, up_to
 from rollover.diagnosis.selection import forward_step, scan
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search

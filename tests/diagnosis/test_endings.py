@@ -10,13 +10,12 @@ from typing import cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.jobs import Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.fit.step import Inquiry, Step
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.selection import simplification
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 

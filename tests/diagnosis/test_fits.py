@@ -16,9 +16,10 @@ import pytest
 from rollover.diagnosis import diagnose, diagnosed_text
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.fit import levenberg_marquardt
-from rollover.diagnosis.fit.jobs import Executor, Task, work
+from rollover.diagnosis.fit.jobs import Executor, work
 from rollover.diagnosis.fit.levenberg_marquardt import Problem, ResidualBlock, time_shift_step
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.discontinuities import largest_jump_nearby
 from rollover.diagnosis.selection.candidates import candidates_of

@@ -13,8 +13,8 @@ import pytest
 
 from rollover.diagnosis.fit.cross_validation import cross_validated_by_refits, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.scan_jobs import serial_map
-from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.fit.step import Inquiry
+from rollover.diagnosis.fit.tasks import serial_map
 from rollover.diagnosis.selection.forward_step import _refitted_where_slopes_mislead
 from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import GAIN, candidate, judge_of

@@ -15,12 +15,11 @@ from rollover.diagnosis.fit.ensemble_mean import ensemble_mean_misfit
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Screened, Step
+from rollover.diagnosis.fit.step import Inquiry, Screened, Step
 from rollover.diagnosis.noise.ensemble import HeavyTail
 from rollover.diagnosis.result import Interval
 from rollover.diagnosis.selection import ensemble_validation as believed
 from rollover.diagnosis.selection import stepwise
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.ensemble_validation import (
     counted_in_full,
     ensemble_validated,

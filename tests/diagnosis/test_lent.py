@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.jobs import Executor, Task
+from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import without_effect
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.selection.forward_step import reusable_slopes
 from rollover.diagnosis.selection.scan import look
 from rollover.diagnosis.settings import SETTINGS

@@ -12,10 +12,9 @@ import pytest
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.result import Interval
 from rollover.diagnosis.selection import decision, ensemble_validation
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
 from rollover.effects import Search

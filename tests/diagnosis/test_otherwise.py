@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.data.dataset import dataset_of
-from rollover.diagnosis.fit.jobs import Executor, Task, work
+from rollover.diagnosis.fit.jobs import Executor, work
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Inquiry
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.selection.candidates import candidates_of
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.forward_step import _restarted_from_base
 from rollover.diagnosis.selection.restarts import from_other_starts, with_common_time_shifts
 from rollover.diagnosis.selection.score_test import ScoreTest

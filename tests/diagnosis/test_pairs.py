@@ -13,10 +13,9 @@ from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
-from rollover.diagnosis.fit.step import Screened, Step
+from rollover.diagnosis.fit.step import Inquiry, Screened, Step
 from rollover.diagnosis.fit.threshold_scan import has_threshold, threshold_starts
 from rollover.diagnosis.selection import pairs
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search

@@ -20,14 +20,13 @@ from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import ended, with_time_shift_search
 from rollover.diagnosis.fit.model_variants import with_fitted_shape
 from rollover.diagnosis.fit.parameterisation import coordinate, coordinates
-from rollover.diagnosis.fit.step import Screened, Step
+from rollover.diagnosis.fit.step import Inquiry, Screened, Step
 from rollover.diagnosis.fit.threshold_scan import threshold_ranges, with_threshold_traced
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.selection import restarts
 from rollover.diagnosis.selection.candidates import candidates_of
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.pairs import best_subsets
 from rollover.diagnosis.selection.restarts import _damping_frequency_scan
 from rollover.diagnosis.selection.score_test import ScoreTest

@@ -12,13 +12,12 @@ import pytest
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.inference.lack_of_fit import Cell, Mismatch
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.selection import decision, forward_step, pairs, stepwise
 from rollover.diagnosis.selection.candidates import candidates_of
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import Explanation, by_first_effect, verdict_on
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.fit.jobs import Executor, Task, linearised
+from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.local_search import linearised
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
-from rollover.diagnosis.fit.step import Screened
-from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.fit.step import Inquiry, Screened
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.selection.forward_step import _first_fits
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import screen

@@ -9,12 +9,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.jobs import Executor, Task
+from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Inquiry
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.selection import scan
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.forward_step import _robust_short_fits
 from rollover.diagnosis.selection.screening import screen
 from rollover.diagnosis.settings import SETTINGS

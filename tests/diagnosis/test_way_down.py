@@ -13,12 +13,11 @@ from rollover.diagnosis.data.phases import drop_phases
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
 from rollover.diagnosis.pipeline import diagnose
 from rollover.diagnosis.prepared import prepared
 from rollover.diagnosis.selection import truncated_start
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.stepwise import Taken
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search

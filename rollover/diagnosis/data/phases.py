@@ -12,6 +12,8 @@ from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.result import Place
 from rollover.diagnosis.settings import SETTINGS
 
+Phases = Sequence[Sequence[tuple[float, str]]]  # of each recording: when each phase begins, and its name
+
 Array = NDArray[np.float64]
 TUNING = SETTINGS.data.phases
 PEAK = "peak"  # the phase about the deepest point

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, time_shift_step
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
+from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.settings import SETTINGS
+
+Groups = Sequence[Sequence[int]]  # recordings that are held out together
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.fit.cross_validation

@@ -10,76 +10,21 @@ import hashlib
 import json
 import os
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar, cast
+from typing import Any, cast
 
-import numpy as np
-from numpy.typing import NDArray
-
-from rollover.diagnosis.fit.finite_differences import beside
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.local_search import polish, with_time_shift_search
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.local_search import linearised, polish, with_time_shift_search
 from rollover.diagnosis.fit.model_variants import in_other_form, with_fitted_shape
-from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.scan_jobs import serial_map
-from rollover.diagnosis.fit.threshold_scan import Stretch, with_threshold_traced
+from rollover.diagnosis.fit.tasks import Progress, R, T, Task, serial_map
+from rollover.diagnosis.fit.threshold_scan import with_threshold_traced
 from rollover.diagnosis.forward.failed_model import FailedModelError
 from rollover.system.processes import Children, Failure, begin_server, map_cases
 from rollover.system.writing import scratch
 
 WARM = "rollover.diagnosis.fit.warmup"
-Progress = Callable[[str], None]
-T = TypeVar("T")
-R = TypeVar("R")
-How = Literal["fit", "polish", "shape", "time", "trace"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Problem.fit`.
-
-    One of few `rounds` is a first look: it ends without slopes.
-    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
-    `form`, "time" tries out the time shifts, "trace" begins anew where it sets in, over a `stretch`. A shape or form
-    that comes nowhere near what the best fit `leaves` of each recording is not gone on with. `reused` as in
-    `Problem.fit`.
-    """
-
-    how: How = "fit"
-    candidates: tuple[Candidate, ...]
-    start: tuple[float, ...]
-    shifts: tuple[float, ...]
-    only: tuple[int, ...] | None = None
-    rounds: int | None = None  # as many as a whole fit may take
-    width: int = 0
-    fixed_shifts: bool = False
-    form: Candidate | None = None
-    stretch: Stretch | None = None
-    leaves: tuple[float, ...] | None = None
-    reused: tuple[NDArray[np.float64], ...] | None = None
-
-    def key(self, about: str) -> str:
-        """Hash of what is fitted and from where, with `about` for all else that it depends on."""
-        every = (*self.candidates, *(() if self.form is None else (self.form,)))
-        names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in every]
-        ways = self.how, self.only, self.rounds, self.width, self.fixed_shifts, self.stretch, self.leaves
-        shared = hashlib.sha256(repr((about, names, self.start, self.shifts, ways)).encode())
-        for J in self.reused or ():
-            shared.update(J.tobytes())
-        return shared.hexdigest()
-
-    @property
-    def recordings(self) -> tuple[int, ...]:
-        """Places of the recordings."""
-        return tuple(range(len(self.shifts))) if self.only is None else self.only
-
-    def beginning(self, fd_steps: Sequence[float]) -> Iterator[tuple[int, Sequence[Candidate], Sequence[float]]]:
-        """(recording, candidates, x) of the runs that a fit begins with."""
-        first = self.reused[0].shape[1] if self.reused else 0
-        return beside(self.recordings, self.candidates, self.start, fd_steps[min(self.width, len(fd_steps) - 1)], first)
 
 
 class Executor:
@@ -312,29 +257,3 @@ def _rebuilt(problem: Problem, task: Task, row: dict[str, Any] | None) -> Fitted
         candidates[-1] = candidates[-1].whole()
     has_no_jacobian = task.how == "fit" and task.rounds is not None  # it ended without slopes
     return linearised(problem, candidates, row["x"], row["shifts"], task.recordings, no_jacobian=has_no_jacobian)
-
-
-def linearised(
-    problem: Problem,
-    candidates: Sequence[Candidate],
-    x: Sequence[float],
-    shifts: Sequence[float],
-    recordings: Sequence[int] | None = None,
-    *,
-    no_jacobian: bool = False,
-) -> Fitted | None:
-    """A fit to all recordings or some as it stands at x and these time shifts (s); None if nothing can be simulated.
-
-    A `no_jacobian` one has no slopes.
-    """
-    blocks: list[ResidualBlock] = []
-    use = range(len(shifts)) if recordings is None else recordings
-    fd_step = 0.0 if no_jacobian else problem.effort.fine
-    if not no_jacobian:
-        problem.simulate_neighbourhood(use, candidates, x, shifts, fd_step)
-    for r, shift in zip(use, shifts, strict=True):
-        block = problem.block(r, candidates, x, shift, fd_step)
-        if block is None:
-            return None
-        blocks.append(block)
-    return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))

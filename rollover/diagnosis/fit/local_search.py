@@ -276,3 +276,29 @@ def without_effect(
     x, shifts = [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks]
     reused = [b.unweighted_J[:, columns] for b in fitted.blocks] if problem.effort.is_ensemble else None
     return problem.fit(rest, x, rounds=rounds, shifts=shifts, no_jacobian=no_jacobian, reused=reused)
+
+
+def linearised(
+    problem: Problem,
+    candidates: Sequence[Candidate],
+    x: Sequence[float],
+    shifts: Sequence[float],
+    recordings: Sequence[int] | None = None,
+    *,
+    no_jacobian: bool = False,
+) -> Fitted | None:
+    """A fit to all recordings or some as it stands at x and these time shifts (s); None if nothing can be simulated.
+
+    A `no_jacobian` one has no slopes.
+    """
+    blocks: list[ResidualBlock] = []
+    use = range(len(shifts)) if recordings is None else recordings
+    fd_step = 0.0 if no_jacobian else problem.effort.fine
+    if not no_jacobian:
+        problem.simulate_neighbourhood(use, candidates, x, shifts, fd_step)
+    for r, shift in zip(use, shifts, strict=True):
+        block = problem.block(r, candidates, x, shift, fd_step)
+        if block is None:
+            return None
+        blocks.append(block)
+    return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))

@@ -1,17 +1,15 @@
-"""One step of a selection: the effect that is added to a base, and the candidates that competed for it."""
+"""What a selection is made with, and its steps: the effect added to a base, and the candidates that competed for it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from rollover.diagnosis.fit.cross_validation import cross_validated, cross_validated_by_refits, held_out
+from rollover.diagnosis.data.phases import Phases
+from rollover.diagnosis.fit.cross_validation import Groups, cross_validated, cross_validated_by_refits, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
-
-Groups = Sequence[Sequence[int]]  # recordings that are held out together
-Phases = Sequence[Sequence[tuple[float, str]]]  # of each recording: when each phase begins, and its name
+from rollover.diagnosis.fit.tasks import ParallelMap, Progress, R, T, Task, TaskRunner, serial_map
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,3 +57,28 @@ class Step:
     def moved_to(self, new: Fitted) -> Step:
         """The same with another fit of its best, among the rivals too."""
         return replace(self, fitted=new, rivals=tuple(new if f is self.fitted else f for f in self.rivals))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inquiry:
+    """What every step of a selection is made with: recordings, effects, what is held out in turn, and who works."""
+
+    problem: Problem
+    candidates: Sequence[Candidate]
+    groups: Groups
+    phases: Phases
+    say: Progress
+    executor: TaskRunner
+
+    def free(self, current: Fitted) -> list[Candidate]:
+        """Candidates that an explanation does not hold yet."""
+        used = {c.key for c in current.candidates}
+        return [c for c in self.candidates if c.key not in used]
+
+    def fits(self, tasks: Sequence[Task]) -> list[Fitted | None]:
+        """What comes of jobs, in their order."""
+        return self.executor.fits(self.problem, tasks, self.say)
+
+    def parallel_map(self, look: Callable[[Problem, T], R], things: Sequence[T]) -> list[R]:
+        """What a look at each thing tells, in their order; see `Executor.parallel_map`."""
+        return self.executor.parallel_map(self.problem, look, things)

@@ -11,6 +11,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, without_shift_direction
 from rollover.diagnosis.fit.local_search import blocks_at, left_at, representative_recordings
 from rollover.diagnosis.fit.parameterisation import Candidate, followed, strength_parameter
+from rollover.diagnosis.fit.tasks import Stretch
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
@@ -19,8 +20,6 @@ TUNING = SETTINGS.fit.threshold_scan
 AFAR = (np.arange(TUNING.wide_count) + 0.5) / TUNING.wide_count
 NEAR = TUNING.near_step * np.arange(-TUNING.near_count, TUNING.near_count + 1)
 CLOCKS = ("sensor-clock-offset", "sensor-clock-drift")
-
-Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to where it is tried
 
 
 def threshold_ranges(fitted: Fitted) -> list[Stretch]:

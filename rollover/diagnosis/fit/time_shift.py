@@ -25,7 +25,7 @@ from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
+from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import spoken
 

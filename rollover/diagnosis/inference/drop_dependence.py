@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
+from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.fit.time_shift import shifts_from_contact
 from rollover.diagnosis.inference.bases import ACCELERATION, DEPTH, SPEED, TIME, linear_b_splines
 from rollover.diagnosis.inference.lack_of_fit import Mismatch

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import Aside
-from rollover.diagnosis.data.phases import phases_of, whole
-from rollover.diagnosis.fit.step import Phases
+from rollover.diagnosis.data.phases import Phases, phases_of, whole
 from rollover.diagnosis.inference.clipping import clipped_channels
 from rollover.diagnosis.inference.coarse_sampling import coarse, digit_sentence
 from rollover.diagnosis.inference.lost_samples import loss_sentence, lost

@@ -15,6 +15,7 @@ from rollover.diagnosis.data.dataset import left_out
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.step import Inquiry
 from rollover.diagnosis.forward.failed_model import FailedModelError
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.invariants import checked
@@ -24,7 +25,6 @@ from rollover.diagnosis.own_model.tables import candidates_of_model, tables
 from rollover.diagnosis.power import cannot_tell
 from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.recording import Recording
 from rollover.system.errors import Fault, InputError
 

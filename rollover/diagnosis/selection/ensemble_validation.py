@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.cross_validation import held_out
+from rollover.diagnosis.fit.cross_validation import Groups, held_out
 from rollover.diagnosis.fit.ensemble_mean import ensemble_mean_misfit, refined_under_scatter
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, physical, same_family
-from rollover.diagnosis.fit.step import Groups, Step
+from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.noise.ensemble import has_diverged, p_value_of_divergence
 from rollover.diagnosis.result import Interval

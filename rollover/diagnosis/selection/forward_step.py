@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.cross_validation import cross_validated_by_refits, held_out, held_out_disadvantage
-from rollover.diagnosis.fit.jobs import Task
+from rollover.diagnosis.data.phases import Phases
+from rollover.diagnosis.fit.cross_validation import Groups, cross_validated_by_refits, held_out, held_out_disadvantage
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
 from rollover.diagnosis.fit.linearisation import at_an_end
 from rollover.diagnosis.fit.local_search import completed_shifts
-from rollover.diagnosis.fit.step import Groups, Phases, Screened, Step
+from rollover.diagnosis.fit.step import Inquiry, Screened, Step
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.restarts import (
     best_of_each,
     continued_from,

@@ -8,16 +8,15 @@ from dataclasses import replace
 from functools import partial
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.jobs import Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import first_effect_last
 from rollover.diagnosis.fit.local_search import completed_shifts, representative_recordings, without_effect
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.fit.step import Inquiry, Step
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.fit.threshold_scan import has_threshold, threshold_ranges, threshold_starts
 from rollover.diagnosis.inference.adequacy import is_enough
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.forward_step import step, with_noise_of_fit
 from rollover.diagnosis.selection.restarts import continued_from, with_shapes

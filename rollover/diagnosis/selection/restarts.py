@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.jobs import How, Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.local_search import (
@@ -23,9 +22,10 @@ from rollover.diagnosis.fit.local_search import (
 )
 from rollover.diagnosis.fit.model_variants import enough, is_noise
 from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Inquiry
+from rollover.diagnosis.fit.tasks import How, Task
 from rollover.diagnosis.fit.threshold_scan import is_clock, threshold_ranges
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 

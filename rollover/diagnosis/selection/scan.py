@@ -8,11 +8,11 @@ from itertools import zip_longest
 
 import numpy as np
 
+from rollover.diagnosis.fit.cross_validation import Groups
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import left_at
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
-from rollover.diagnosis.fit.step import Groups
+from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.selection.ensemble_validation import with_shifts_near_prior
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value, score_test
 from rollover.diagnosis.selection.screening import initial_time_shifts, representative_few

@@ -25,7 +25,7 @@ from rollover.diagnosis.fit.parameterisation import (
     is_limit,
     null_of,
 )
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
+from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.noise.ensemble import gained
 from rollover.diagnosis.selection.pair_score import best_direction_pairs
 from rollover.diagnosis.settings import SETTINGS

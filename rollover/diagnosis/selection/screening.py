@@ -12,10 +12,9 @@ from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
 from rollover.diagnosis.fit.linearisation import without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate, same_family
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
-from rollover.diagnosis.fit.step import Screened
+from rollover.diagnosis.fit.step import Inquiry, Screened
+from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.fit.time_shift import shifts_from_contact
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort

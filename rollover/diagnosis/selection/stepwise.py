@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeGuard
 
+from rollover.diagnosis.data.phases import Phases
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import (
     has_uncertain_conditions,
     refitted_with_conditions,
     with_time_shift_search,
 )
-from rollover.diagnosis.fit.step import Phases, Step
+from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.time_shift import is_explained_by_clocks
 from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
 from rollover.diagnosis.noise.ensemble import has_diverged
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.ensemble_validation import (
     ensemble_validated,
     restarted_base,

@@ -15,12 +15,11 @@ import numpy as np
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.phases import PEAK
-from rollover.diagnosis.fit.jobs import Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.fit.step import Inquiry, Step
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.noise.truncation import up_to
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.pairs import is_better
 from rollover.diagnosis.selection.stepwise import Taken, forward_selection
 from rollover.diagnosis.settings import SETTINGS

@@ -1,0 +1,89 @@
+"""Fits and maps as tasks, and the interface of what works them off: this process, or an `Executor` with children."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.fit.finite_differences import beside
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.parameterisation import Candidate
+
+Progress = Callable[[str], None]
+How = Literal["fit", "polish", "shape", "time", "trace"]
+Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to where it is tried
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class ParallelMap(Protocol):
+    """A map over things, of a function that is given the problem too."""
+
+    def __call__(self, problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T], /) -> list[R]:
+        """`look(problem, thing)` of each, in their order."""
+
+
+def serial_map(problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T]) -> list[R]:
+    """`look(problem, thing)` of each, one after another."""
+    return [look(problem, thing) for thing in things]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Problem.fit`.
+
+    One of few `rounds` is a first look: it ends without slopes.
+    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
+    `form`, "time" tries out the time shifts, "trace" begins anew where it sets in, over a `stretch`. A shape or form
+    that comes nowhere near what the best fit `leaves` of each recording is not gone on with. `reused` as in
+    `Problem.fit`.
+    """
+
+    how: How = "fit"
+    candidates: tuple[Candidate, ...]
+    start: tuple[float, ...]
+    shifts: tuple[float, ...]
+    only: tuple[int, ...] | None = None
+    rounds: int | None = None  # as many as a whole fit may take
+    width: int = 0
+    fixed_shifts: bool = False
+    form: Candidate | None = None
+    stretch: Stretch | None = None
+    leaves: tuple[float, ...] | None = None
+    reused: tuple[NDArray[np.float64], ...] | None = None
+
+    def key(self, about: str) -> str:
+        """Hash of what is fitted and from where, with `about` for all else that it depends on."""
+        every = (*self.candidates, *(() if self.form is None else (self.form,)))
+        names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in every]
+        ways = self.how, self.only, self.rounds, self.width, self.fixed_shifts, self.stretch, self.leaves
+        shared = hashlib.sha256(repr((about, names, self.start, self.shifts, ways)).encode())
+        for J in self.reused or ():
+            shared.update(J.tobytes())
+        return shared.hexdigest()
+
+    @property
+    def recordings(self) -> tuple[int, ...]:
+        """Places of the recordings."""
+        return tuple(range(len(self.shifts))) if self.only is None else self.only
+
+    def beginning(self, fd_steps: Sequence[float]) -> Iterator[tuple[int, Sequence[Candidate], Sequence[float]]]:
+        """(recording, candidates, x) of the runs that a fit begins with."""
+        first = self.reused[0].shape[1] if self.reused else 0
+        return beside(self.recordings, self.candidates, self.start, fd_steps[min(self.width, len(fd_steps) - 1)], first)
+
+
+class TaskRunner(Protocol):
+    """What works off fits and maps; `jobs.Executor` does."""
+
+    def fits(self, problem: Problem, tasks: Sequence[Task], say: Progress = ...) -> list[Fitted | None]:
+        """Fits in the order of the tasks; None where nothing could be simulated."""
+
+    def parallel_map(self, problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T], /) -> list[R]:
+        """`look(problem, thing)` of each, in their order."""
