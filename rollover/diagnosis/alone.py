@@ -10,8 +10,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import with_time_shift_search
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.grades import jackknifed, share_beyond, share_of, shares
-from rollover.diagnosis.inference.adequacy import is_tolerated
-from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import is_tolerated, mismatch_of
 from rollover.diagnosis.inference.repeated_course import predicted_by_others, quick_channels
 from rollover.diagnosis.inference.residual_law import fitted_law
 from rollover.diagnosis.probabilities import credible, log_evidence

@@ -20,10 +20,8 @@ from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.grades import graded, with_shares
-from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
-from rollover.diagnosis.inference.condition_pulls import pull_notes
 from rollover.diagnosis.inference.discrepancy import Discrepancy
-from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import is_enough, is_tolerated, mismatch_of
 from rollover.diagnosis.inference.recording_faults import RecordingFault, intrinsic_faults, misread, truncation_fault
 from rollover.diagnosis.invariants import clear_of_null, is_noise_alone, next_best, rejected_effects
 from rollover.diagnosis.noise.offsets import zero_notes
@@ -44,6 +42,7 @@ from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     interval_contains_null,
     named,
+    pull_notes,
 )
 from rollover.dynamics.drop_test import unfit
 from rollover.recording import Recording

@@ -10,10 +10,10 @@ import numpy as np
 
 from rollover.diagnosis.alone import follows_a_law, repeats_its_course
 from rollover.diagnosis.conclusion import Asked, Conclusion, concluded
+from rollover.diagnosis.data.condition_uncertainty import with_rounding_uncertainty
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import Aside, find_inconsistencies, without_inconsistent
 from rollover.diagnosis.data.onset import clock_notes, with_clock_zeros
-from rollover.diagnosis.data.rounding import with_rounding_uncertainty
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.time_shift import align, clock_outliers, is_explained_by_clocks

@@ -8,7 +8,7 @@ import pytest
 from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
-from rollover.diagnosis.noise.outliers import outlier_p_value, without_outliers
+from rollover.diagnosis.noise.spectral_lines import outlier_p_value, without_outliers
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.test_chaos import SIGMA, STEP, N, dataset
 

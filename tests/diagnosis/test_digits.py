@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.rounding import decimals, with_rounding_uncertainty
+from rollover.diagnosis.data.condition_uncertainty import decimals, with_rounding_uncertainty
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 

@@ -15,7 +15,6 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.grades import jackknifed
-from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.discrepancy import (
     MEDIAN,
     SPREAD,
@@ -27,7 +26,7 @@ from rollover.diagnosis.inference.discrepancy import (
     residual_rms,
     with_discrepancy,
 )
-from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import is_tolerated, mismatch_of
 from rollover.diagnosis.inference.repeated_course import predicted_by_others, quick_channels
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.settings import SETTINGS

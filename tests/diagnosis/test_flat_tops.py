@@ -11,7 +11,7 @@ from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.quantisation import with_quantisation
 from rollover.diagnosis.forward.averaging import simulated
-from rollover.diagnosis.inference.clipping import clipped_channels
+from rollover.diagnosis.inference.recording_faults import clipped_channels
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, recorded, scenario

@@ -10,8 +10,7 @@ import pytest
 
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.selection import pairs
-from rollover.diagnosis.selection.pair_score import best_direction_pairs
-from rollover.diagnosis.selection.score_test import ScoreTest, score_test
+from rollover.diagnosis.selection.score_test import ScoreTest, best_direction_pairs, score_test
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of

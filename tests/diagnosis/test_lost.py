@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.inference.lost_samples import lost
+from rollover.diagnosis.inference.recording_faults import lost
 from rollover.recording import Recording
 from rollover.recording.checks import prechecks
 from rollover.recording.checks.finding import trace

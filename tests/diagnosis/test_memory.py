@@ -9,7 +9,7 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.fit import cache
-from rollover.diagnosis.fit.notebook import Memory
+from rollover.diagnosis.fit.cache import Memory
 from tests.diagnosis.drops import recorded, scenario
 
 

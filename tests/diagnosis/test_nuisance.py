@@ -17,8 +17,8 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import coordinate
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.forward_model import set_up, simulator_of
-from rollover.diagnosis.inference.condition_pulls import mean_pulls, pull_notes
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
+from rollover.diagnosis.statements import mean_pulls, pull_notes
 from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Clock, Recording
 from rollover.recording.importers import read_recording, write_recording

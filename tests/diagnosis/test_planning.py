@@ -16,8 +16,8 @@ from rollover.diagnosis.data.whitening import Whitening
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinates
-from rollover.diagnosis.planning import chances
-from rollover.diagnosis.planning.by_fits import next_test
+from rollover.diagnosis.planning import strength as chances
+from rollover.diagnosis.planning.next_test import next_test
 from rollover.diagnosis.planning.plan import plan, usual_noise
 from rollover.diagnosis.planning.planned import Instruments, coloured, only, planned, showing
 from rollover.diagnosis.planning.separation import Tests as PlannedTests

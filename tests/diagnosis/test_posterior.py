@@ -21,7 +21,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.inference.posterior import drawn
-from rollover.diagnosis.own_model.files import found_at
+from rollover.diagnosis.own_model.declaration import found_at
 from rollover.effects import Search
 from rollover.recording.importers import write_recording
 from tests.diagnosis.drops import recorded, scenario

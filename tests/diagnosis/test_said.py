@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import statements
+from rollover.diagnosis.asked import finding_lines
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import drop_phases
 from rollover.diagnosis.fit.cross_validation import Held
@@ -18,7 +19,6 @@ from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.inference.scores import misfit_before_impact
 from rollover.diagnosis.noise.ensemble import HeavyTail
 from rollover.diagnosis.result import Interval, Named, Score
-from rollover.diagnosis.sensors_first import in_words
 from rollover.diagnosis.statements import sentence
 from rollover.effects import EFFECTS, units_of
 from rollover.effects.sensor import SensorBias, SensorClipping
@@ -169,7 +169,7 @@ def test_many_findings_alike_are_counted() -> None:
         about = {"channel": FORCE, "start": 0.0, "end": 1.0, "value": 2.0, "unit": "N", "error": None}
         return "d1", Finding(check=check, sentence=f"{check} {k}", **about)
 
-    said = list(in_words([*(found("stuck", k) for k in range(9)), found("spike", 0)]))
+    said = list(finding_lines([*(found("stuck", k) for k in range(9)), found("spike", 0)]))
     first = [f"d1: {FORCE}: stuck {k}" for k in range(3)]
     assert said == [*first, f"d1: {FORCE}: 6 more such findings (stuck)", f"d1: {FORCE}: spike 0"]
 

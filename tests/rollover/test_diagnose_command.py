@@ -279,7 +279,7 @@ def test_an_estimate_is_made_as_it_is_asked_for(
         seen.append(estimate)
         raise InputError(Fault(message="enough"))
 
-    monkeypatch.setattr("rollover.diagnosis.sensors_first.diagnosed", diagnosed)
+    monkeypatch.setattr("rollover.diagnosis.asked.diagnosed_with_prechecks", diagnosed)
     assert rollover("diagnose", "drop_test", folder, "--out", tmp_path / "out", *words).exit_code == 2
     assert seen == [asked]
 

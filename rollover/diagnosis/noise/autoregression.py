@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset, Signal, noise_from_differences
 from rollover.diagnosis.forward.forward_model import first_impact_of
 from rollover.diagnosis.noise.drift import is_recorder_noise
-from rollover.diagnosis.noise.outliers import without_outliers
-from rollover.diagnosis.noise.spectral_lines import lines, without
+from rollover.diagnosis.noise.spectral_lines import lines, without, without_outliers
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording.filters import attenuation, least_rate
 from rollover.recording.noise_floor import LENGTH, NoiseFloor, grown, noise_floor

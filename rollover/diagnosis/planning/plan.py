@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
+from rollover.assessment.results import plain, versions
 from rollover.diagnosis.fit.parameterisation import Candidate, is_limit, null_of
 from rollover.diagnosis.forward.forward_model import set_up
-from rollover.diagnosis.planning.chances import detection, needed, of_one
 from rollover.diagnosis.planning.next_test import Advice, Grid, advice, varied
 from rollover.diagnosis.planning.planned import Instruments, planned
 from rollover.diagnosis.planning.separation import Apart, Tests
-from rollover.diagnosis.planning.strength import place_where_it_acts, strength_with, usual
+from rollover.diagnosis.planning.strength import detection, needed, of_one, place_where_it_acts, strength_with, usual
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import COLUMNS, unfit
 from rollover.effects import EFFECTS, spoken, units_of
 from rollover.scenario import Scenario
 from rollover.system.errors import Fault, InputError, hint
+
+FORMAT = "rollover-plan/1"
+JSON, PAGE = "plan.json", "report.html"
+FILES = (JSON, PAGE)
 
 TUNING = SETTINGS.planning
 
@@ -240,3 +244,21 @@ def _closest(pairs: Sequence[Pair]) -> list[tuple[str, str]]:
         mean[a, b] = _mean(pairs, a, b)
     close = sorted((value, pair) for pair, value in mean.items() if value < TUNING.told_apart)
     return [(a, b) for _, (a, b) in close[: TUNING.few]]
+
+
+def json_of(found: Plan, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """What plan.json says, bare JSON values; `about` names what was asked."""
+    fields = asdict(found)
+    effects, pairs, tests = (fields.pop(key) for key in ("effects", "pairs", "next_tests"))
+    answer: dict[str, Any] = plain(
+        {
+            "format": FORMAT,
+            **(about or {}),
+            **fields,
+            "effects": effects,
+            "pairs": [{**p, "is_told_apart": p["probability"] >= found.told_apart} for p in pairs],
+            "next_tests": tests,
+            "versions": versions(),
+        }
+    )
+    return answer

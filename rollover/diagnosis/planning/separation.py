@@ -13,9 +13,8 @@ from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.planning.chances import choice
 from rollover.diagnosis.planning.planned import showing
-from rollover.diagnosis.planning.strength import scaled
+from rollover.diagnosis.planning.strength import choice, scaled
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]

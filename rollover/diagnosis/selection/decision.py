@@ -14,8 +14,7 @@ from rollover.diagnosis.fit.linearisation import at_an_end, first_effect_last
 from rollover.diagnosis.fit.local_search import all_but_one, left_at, without_effect
 from rollover.diagnosis.fit.parameterisation import Candidate, is_one_sensor, with_slices
 from rollover.diagnosis.fit.step import Inquiry, Step
-from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated, matters
-from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import Mismatch, is_enough, is_tolerated, matters, mismatch_of
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.ensemble_validation import counted_in_full, significant_by_wald
 from rollover.diagnosis.selection.flexibility import is_a_curve, is_flexible_soil, is_over_flexible, is_straight_line

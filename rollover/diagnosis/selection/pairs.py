@@ -15,8 +15,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.fit.threshold_scan import has_threshold, threshold_ranges, threshold_starts
-from rollover.diagnosis.inference.adequacy import is_enough
-from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import Mismatch, is_enough, mismatch_of
 from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.forward_step import step, with_noise_of_fit
 from rollover.diagnosis.selection.restarts import continued_from, with_shapes

@@ -27,12 +27,12 @@ from rollover.diagnosis.fit.parameterisation import (
 )
 from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.noise.ensemble import gained
-from rollover.diagnosis.selection.pair_score import best_direction_pairs
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
 Place = tuple[str, tuple[float, ...]]  # a candidate's key, and coordinates of it
 TUNING = SETTINGS.selection.score_test
+PAIRS = SETTINGS.selection.pair_score
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -287,3 +287,37 @@ def p_value(gain: float, null: Array) -> float:
 
     anchor = float(null[-10])
     return float(10.0 / null.size * chdtrc(1, gain) / max(chdtrc(1, anchor), 1e-300))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Both:
+    """Two directions, by their places among all, what they gain together, and how far along each that is."""
+
+    places: tuple[int, int]
+    gain: float
+    along: tuple[float, float]
+
+
+def best_direction_pairs(along: Array, cosines: Array, owners: Sequence[str]) -> list[Both]:
+    """The best two directions of each pair of owners, the pair that gains most first.
+
+    With z (m,) the misfit along unit directions and c their cosines (m, m), two gain
+    g = (z_i^2 + z_j^2 - 2 c z_i z_j)/(1 - c^2) along a_i = (z_i - c z_j)/(1 - c^2): least squares of two columns. What
+    two that are nearly one would gain by their difference is no more than arithmetic.
+    """
+    z, c = along, np.clip(cosines, -1.0, 1.0)
+    rest = 1.0 - c**2
+    able = rest > PAIRS.same_direction
+    rest = np.where(able, rest, 1.0)
+    gains = np.where(able, (z[:, None] ** 2 + z[None, :] ** 2 - 2.0 * c * np.outer(z, z)) / rest, 0.0)
+    best: dict[frozenset[str], Both] = {}
+    upper = np.triu_indices(z.size, 1)
+    for k in np.argsort(-gains[upper], kind="stable"):
+        i, j = int(upper[0][k]), int(upper[1][k])
+        pair = frozenset((owners[i], owners[j]))
+        if len(pair) == 2 and pair not in best:
+            far = ((z[i] - c[i, j] * z[j]) / rest[i, j], (z[j] - c[i, j] * z[i]) / rest[i, j])
+            best[pair] = Both(places=(i, j), gain=float(gains[i, j]), along=(float(far[0]), float(far[1])))
+            if len(best) == PAIRS.most_pairs:
+                break
+    return list(best.values())

@@ -15,8 +15,7 @@ from rollover.diagnosis.fit.local_search import (
 )
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.time_shift import is_explained_by_clocks
-from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
-from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import Mismatch, is_enough, is_tolerated, mismatch_of
 from rollover.diagnosis.noise.ensemble import has_diverged
 from rollover.diagnosis.selection.ensemble_validation import (
     ensemble_validated,
