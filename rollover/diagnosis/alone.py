@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rollover.diagnosis.fit.cross_validation import Groups, held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ends_at_bound
 from rollover.diagnosis.fit.local_search import with_time_shift_search
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.grades import jackknifed, share_beyond, share_of, shares
@@ -15,10 +16,9 @@ from rollover.diagnosis.inference.repeated_course import predicted_by_others, qu
 from rollover.diagnosis.inference.residual_law import fitted_law
 from rollover.diagnosis.probabilities import credible, log_evidence
 from rollover.diagnosis.result import Verdict
-from rollover.diagnosis.selection.decision import Explanation, kind_of
-from rollover.diagnosis.selection.forward_step import by_chance, confusion, ends_at_bound, step
+from rollover.diagnosis.selection.explanation import Explanation, kind_of, with_conditions_refitted
+from rollover.diagnosis.selection.forward_step import by_chance, confusion, step
 from rollover.diagnosis.selection.scan import look
-from rollover.diagnosis.selection.stepwise import with_conditions_refitted
 from rollover.diagnosis.settings import SETTINGS
 from rollover.scenario import Scenario
 

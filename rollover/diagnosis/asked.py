@@ -12,8 +12,8 @@ from rollover.calibration.posterior import draws_of
 from rollover.comparison.recordings import Recordings, held_out, measured
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.forward.forward_model import set_up
-from rollover.diagnosis.own_model import ForwardModel, diagnose_model, load_model
-from rollover.diagnosis.own_model.declaration import declared
+from rollover.diagnosis.own_model.declaration import ForwardModel, declared, load_model
+from rollover.diagnosis.own_model.pipeline import diagnose_model
 from rollover.diagnosis.own_model.tables import tables
 from rollover.diagnosis.pipeline import diagnose
 from rollover.diagnosis.result import Diagnosis, Estimate

@@ -13,7 +13,8 @@ from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.data.repeatability import inconsistent_repeats
 from rollover.diagnosis.fit.cross_validation import Groups
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import has_uncertain_conditions, refitted_with_conditions
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry, Step
@@ -31,13 +32,13 @@ from rollover.diagnosis.prepared import weighted_datasets
 from rollover.diagnosis.result import Answer, Diagnosis, Named, Verdict
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from rollover.diagnosis.selection.decision import (
-    Explanation,
     by_first_effect,
     explained,
     explains_little,
     redundant_effects,
     verdict_on,
 )
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     interval_contains_null,

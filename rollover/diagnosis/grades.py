@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Groups, held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate, with_slices
 from rollover.diagnosis.result import Answer, Named, Share, Verdict
-from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]

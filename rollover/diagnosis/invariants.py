@@ -10,14 +10,13 @@ import numpy as np
 
 from rollover.diagnosis.data.phases import Phases
 from rollover.diagnosis.fit.cross_validation import Groups, held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ends_at_bound
 from rollover.diagnosis.fit.parameterisation import coordinate, physical, strength_parameter
 from rollover.diagnosis.inference.intervals import held_at
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.result import Diagnosis, Named
-from rollover.diagnosis.selection.decision import Explanation
-from rollover.diagnosis.selection.forward_step import ends_at_bound
-from rollover.diagnosis.selection.stepwise import with_conditions_refitted
+from rollover.diagnosis.selection.explanation import Explanation, with_conditions_refitted
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import is_null_effect
 from rollover.effects import EFFECTS

@@ -10,13 +10,11 @@ from typing import Any
 
 from rollover.assessment.results import plain, versions
 from rollover.calibration import posterior
-from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.pipeline import diagnose
 from rollover.diagnosis.result import Diagnosis, Draws, Interval, Law, Named, Place, Score
 from rollover.effects import nth
 from rollover.recording import Recording
 from rollover.recording.importers import read_named
-from rollover.scenario import Scenario, load
+from rollover.scenario import Scenario
 from rollover.spec.document import dump
 
 FORMAT = "rollover-diagnosis/1"
@@ -146,10 +144,3 @@ def diagnosed_text(scenario: Scenario, found: Diagnosis) -> str:
 def recordings_in(folder: Path) -> list[tuple[str, Recording]]:
     """Name and recording of each table in a folder, by name. Raises `InputError`."""
     return [(name, recording) for name, (_, recording) in read_named([folder]).items()]
-
-
-def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
-    """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says."""
-    del out
-    with Executor(workers) as executor:
-        return json_of(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), executor=executor))

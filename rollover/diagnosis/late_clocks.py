@@ -11,7 +11,7 @@ from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.inference.scores import judged
 from rollover.diagnosis.result import Diagnosis, Interval, Named
-from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, spoken
 

@@ -20,8 +20,9 @@ from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import on_attitude_branch, simulated, with_reference_attitude
-from rollover.diagnosis.forward.forward_model import Simulator, simulator_of
+from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.forward.full_run import CENTRE, full_runs, made_ahead
+from rollover.diagnosis.forward.interface import Simulator
 from rollover.diagnosis.io import diagnosed_scenario
 from rollover.diagnosis.noise.ensemble import running_mean
 from rollover.diagnosis.noise.heteroscedasticity import with_variance_model

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,21 +17,23 @@ from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import Aside, find_inconsistencies, without_inconsistent
 from rollover.diagnosis.data.onset import clock_notes, with_clock_zeros
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.time_shift import align, clock_outliers, is_explained_by_clocks
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference.discrepancy import Discrepancy, estimated, learned_from_references, with_discrepancy
 from rollover.diagnosis.inference.wrong_condition import wrong_conditions
 from rollover.diagnosis.invariants import checked
+from rollover.diagnosis.io import json_of, recordings_in
 from rollover.diagnosis.late_clocks import with_clock_finding
 from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis, Estimate
-from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.dynamics.drop_test import unfit
 from rollover.recording import Recording
 from rollover.recording.attitude import continuous
-from rollover.scenario import Scenario
+from rollover.scenario import Scenario, load
 from rollover.spec.vehicle import Striker
 
 
@@ -223,3 +227,10 @@ def _with_clocks_corrected(found: Conclusion, every: Sequence[Dataset], notes: S
     if other.verdict in ("unexplained", "cannot-tell"):
         return None
     return with_clock_finding(other, late, problem, found.tried)
+
+
+def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
+    """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says."""
+    del out
+    with Executor(workers) as executor:
+        return json_of(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), executor=executor))

@@ -13,8 +13,9 @@ from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import compared
-from rollover.diagnosis.forward.forward_model import first_impact_of, set_up
+from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.forward.full_run import full_runs
+from rollover.diagnosis.forward.interface import first_impact_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.ensemble import with_sample_weights
 from rollover.diagnosis.noise.heteroscedasticity import with_variance_model

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.inference.discrepancy import MEDIAN, SCALES, SPREAD, residual_rms
-from rollover.diagnosis.selection.decision import Explanation, strongest
+from rollover.diagnosis.selection.explanation import Explanation, strongest
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]

@@ -12,13 +12,14 @@ from rollover.diagnosis.data.condition_uncertainty import pulls
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Groups, Held, held_out
 from rollover.diagnosis.fit.ensemble_mean import refined_by_ensemble_mean
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
 from rollover.diagnosis.result import Considered, Named, Place, Score, Share, Verdict
-from rollover.diagnosis.selection.decision import Explanation, strongest
+from rollover.diagnosis.selection.explanation import Explanation, strongest
 from rollover.diagnosis.selection.forward_step import confusion
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS

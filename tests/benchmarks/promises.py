@@ -14,7 +14,8 @@ import numpy as np
 from scipy.stats import binomtest
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.planning.plan import usual_noise
 from rollover.diagnosis.planning.planned import Instruments, planned, showing

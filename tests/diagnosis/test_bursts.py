@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.spectral_lines import outlier_p_value, without_outliers

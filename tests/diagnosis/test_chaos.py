@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import kstest
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise.ensemble import (

@@ -11,7 +11,8 @@ import pytest
 
 from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.data.phases import drop_phases
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import simulated

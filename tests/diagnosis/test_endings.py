@@ -10,8 +10,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted
-from rollover.diagnosis.fit.linearisation import ResidualBlock
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.tasks import Task

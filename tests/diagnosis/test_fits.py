@@ -17,7 +17,8 @@ from rollover.diagnosis import diagnose, diagnosed_text
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.fit import levenberg_marquardt
 from rollover.diagnosis.fit.jobs import Executor, work
-from rollover.diagnosis.fit.levenberg_marquardt import Problem, ResidualBlock, time_shift_step
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import ResidualBlock, time_shift_step
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.forward.averaging import simulated

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.fit import model_variants
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.data.quantisation import with_quantisation
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import ResidualBlock
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.inference import intervals as stated
 from rollover.diagnosis.settings import SETTINGS

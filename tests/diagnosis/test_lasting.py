@@ -16,6 +16,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry, Screened, Step
+from rollover.diagnosis.fit.time_shift import with_shifts_near_prior
 from rollover.diagnosis.noise.ensemble import HeavyTail
 from rollover.diagnosis.result import Interval
 from rollover.diagnosis.selection import ensemble_validation as believed
@@ -29,7 +30,6 @@ from rollover.diagnosis.selection.ensemble_validation import (
     judged_before_impact,
     restarted_base,
     with_full_weights,
-    with_shifts_near_prior,
     without_unsupported_rivals,
 )
 from rollover.diagnosis.selection.forward_step import _chosen

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import without_effect
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.selection.forward_step import reusable_slopes

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.fit import ensemble_mean
-from rollover.diagnosis.fit.ensemble_mean import refined_under_scatter
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import ResidualBlock
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.selection.ensemble_validation import refined_under_scatter
 from tests.diagnosis.test_slopes import CHANNEL, MASS, SLOPE, TIME, Scattering, dataset
 
 

@@ -9,12 +9,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import ResidualBlock
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.result import Interval
-from rollover.diagnosis.selection import decision, ensemble_validation
+from rollover.diagnosis.selection import decision, ensemble_validation, explanation
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
 from rollover.effects import Search
@@ -116,11 +116,11 @@ def test_the_strongest_is_that_without_which_most_is_left(monkeypatch: pytest.Mo
         assert shifts == [0.0]
         return {"soil-layer": 3.0, "soil-crust": None}[candidates[0].id]  # without the layer no run is to be had
 
-    monkeypatch.setattr(decision, "left_at", left_at)
-    monkeypatch.setattr(decision, "without_effect", lambda _, f, k, rounds: left(of(CRUST), 2.0 - k))
+    monkeypatch.setattr(explanation, "left_at", left_at)
+    monkeypatch.setattr(explanation, "without_effect", lambda _, f, k, rounds: left(of(CRUST), 2.0 - k))
     problem = cast(Any, SimpleNamespace(effort=effort))
     held = replace(left(of(LAYER, CRUST), 1.0), x=(0.1, 0.2, 0.3, 0.4))
-    assert decision.strongest(problem, left(of(), 9.0), held).id == "soil-layer"
+    assert explanation.strongest(problem, left(of(), 9.0), held).id == "soil-layer"
     assert asked == ([(["soil-crust"], [0.3, 0.4]), (["soil-layer"], [0.1, 0.2])] if effort.is_ensemble else [])
 
 

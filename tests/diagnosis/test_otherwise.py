@@ -11,8 +11,8 @@ import pytest
 
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.fit.jobs import Executor, work
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import ResidualBlock
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry
 from rollover.diagnosis.fit.tasks import Task

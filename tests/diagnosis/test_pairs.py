@@ -11,7 +11,8 @@ import pytest
 
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.fit.step import Inquiry, Screened, Step
 from rollover.diagnosis.fit.threshold_scan import has_threshold, threshold_starts

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.inference.vehicle_dependence import dependency
 from rollover.diagnosis.noise.ensemble import HeavyTail
 from tests.diagnosis.test_chassis import ABOUT, ALONG, thrown

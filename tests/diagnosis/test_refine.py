@@ -16,7 +16,8 @@ from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit import levenberg_marquardt, local_search, threshold_scan
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import ended, with_time_shift_search
 from rollover.diagnosis.fit.model_variants import with_fitted_shape
 from rollover.diagnosis.fit.parameterisation import coordinate, coordinates

@@ -15,7 +15,6 @@ from rollover.diagnosis.fit import ensemble_mean
 from rollover.diagnosis.fit.ensemble_mean import (
     ensemble_mean_step,
     projected_gradient,
-    refined_under_scatter,
     with_ensemble_scatter,
 )
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
@@ -26,6 +25,7 @@ from rollover.diagnosis.forward import full_run
 from rollover.diagnosis.forward.full_run import CENTRE, Made, Making, RunSimulator
 from rollover.diagnosis.inference import intervals as intervals_of
 from rollover.diagnosis.inference.intervals import ensemble_variance, intervals, shape_variance
+from rollover.diagnosis.selection.ensemble_validation import refined_under_scatter
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
 from rollover.diagnosis.statements import step_error_note

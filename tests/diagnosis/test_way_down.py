@@ -11,7 +11,8 @@ import pytest
 
 from rollover.diagnosis.data.phases import drop_phases
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.inference.lack_of_fit import Mismatch

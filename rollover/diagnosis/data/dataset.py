@@ -20,7 +20,7 @@ from rollover.diagnosis.forward.discontinuities import (
     near_discontinuity,
     weights_after_discontinuities,
 )
-from rollover.diagnosis.forward.forward_model import Simulator
+from rollover.diagnosis.forward.interface import Simulator
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from rollover.recording.noise_floor import LENGTH, USUAL, NoiseFloor, grown, noise_floor

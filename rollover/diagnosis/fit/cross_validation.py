@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, time_shift_step
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, time_shift_step
 from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.settings import SETTINGS
 
@@ -83,7 +84,7 @@ def cross_validated_by_refits(
     fitted: Fitted,
     groups: Sequence[Sequence[int]],
     without: float = np.inf,
-    parallel_map: ParallelMap = serial_map,
+    parallel_map: ParallelMap[Problem] = serial_map,
 ) -> Fitted:
     """A fit with what it foretells by fits to the other groups, where slopes foretell far worse than it meets them.
 

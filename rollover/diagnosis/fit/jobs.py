@@ -15,12 +15,13 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, cast
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import linearised, polish, with_time_shift_search
 from rollover.diagnosis.fit.model_variants import in_other_form, with_fitted_shape
 from rollover.diagnosis.fit.tasks import Progress, R, T, Task, serial_map
 from rollover.diagnosis.fit.threshold_scan import with_threshold_traced
-from rollover.diagnosis.forward.failed_model import FailedModelError
+from rollover.diagnosis.forward.interface import FailedModelError
 from rollover.system.processes import Children, Failure, begin_server, map_cases
 from rollover.system.writing import scratch
 

@@ -197,3 +197,8 @@ def without_shift_direction(vectors: Array, block: ResidualBlock) -> Array:
     s = block.slope
     shrink = (1.0 - np.sqrt(block.prior**-2 / block.weight)) / max(float(s @ s), 1e-300)
     return np.asarray(vectors - shrink * np.outer(s, s @ vectors))
+
+
+def ends_at_bound(fitted: Fitted) -> bool:
+    """Whether a number of the last effect stands at an end of its range."""
+    return any(at_an_end(v) for v in fitted.own)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.forward.forward_model import EDGES
+from rollover.diagnosis.forward.interface import EDGES
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, Search, nth
 

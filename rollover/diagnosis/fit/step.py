@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from rollover.diagnosis.data.phases import Phases
 from rollover.diagnosis.fit.cross_validation import Groups, cross_validated, cross_validated_by_refits, held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.tasks import ParallelMap, Progress, R, T, Task, TaskRunner, serial_map
+from rollover.diagnosis.fit.tasks import ParallelMap, Progress, R, T, Task, serial_map
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +42,9 @@ class Step:
         """The same under the noise as it is held now."""
         return self._each(problem.again)
 
-    def cross_validated(self, problem: Problem, groups: Groups, parallel_map: ParallelMap = serial_map) -> Step:
+    def cross_validated(
+        self, problem: Problem, groups: Groups, parallel_map: ParallelMap[Problem] = serial_map
+    ) -> Step:
         """The same with what its fits foretell by runs, where slopes do not hold for long; of drops its best alone."""
         if problem.effort.is_ensemble:
             return self._each(lambda f: cross_validated(problem, f, groups))
@@ -57,6 +61,16 @@ class Step:
     def moved_to(self, new: Fitted) -> Step:
         """The same with another fit of its best, among the rivals too."""
         return replace(self, fitted=new, rivals=tuple(new if f is self.fitted else f for f in self.rivals))
+
+
+class TaskRunner(Protocol):
+    """What works off fits and maps; `jobs.Executor` does."""
+
+    def fits(self, problem: Problem, tasks: Sequence[Task], say: Progress = ...) -> list[Fitted | None]:
+        """Fits in the order of the tasks; None where nothing could be simulated."""
+
+    def parallel_map(self, problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T], /) -> list[R]:
+        """`look(problem, thing)` of each, in their order."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Fits and maps as tasks, and the interface of what works them off: this process, or an `Executor` with children."""
+"""Fits as tasks, and maps over things: what is worked off in this process, or by an `Executor` with children."""
 
 from __future__ import annotations
 
@@ -11,25 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import beside
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
 
 Progress = Callable[[str], None]
 How = Literal["fit", "polish", "shape", "time", "trace"]
 Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to where it is tried
 
+P = TypeVar("P")
+Q = TypeVar("Q")
 T = TypeVar("T")
 R = TypeVar("R")
 
 
-class ParallelMap(Protocol):
+class ParallelMap(Protocol[P]):
     """A map over things, of a function that is given the problem too."""
 
-    def __call__(self, problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T], /) -> list[R]:
+    def __call__(self, problem: P, look: Callable[[P, T], R], things: Sequence[T], /) -> list[R]:
         """`look(problem, thing)` of each, in their order."""
 
 
-def serial_map(problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T]) -> list[R]:
+def serial_map(problem: Q, look: Callable[[Q, T], R], things: Sequence[T]) -> list[R]:
     """`look(problem, thing)` of each, one after another."""
     return [look(problem, thing) for thing in things]
 
@@ -77,13 +78,3 @@ class Task:
         """(recording, candidates, x) of the runs that a fit begins with."""
         first = self.reused[0].shape[1] if self.reused else 0
         return beside(self.recordings, self.candidates, self.start, fd_steps[min(self.width, len(fd_steps) - 1)], first)
-
-
-class TaskRunner(Protocol):
-    """What works off fits and maps; `jobs.Executor` does."""
-
-    def fits(self, problem: Problem, tasks: Sequence[Task], say: Progress = ...) -> list[Fitted | None]:
-        """Fits in the order of the tasks; None where nothing could be simulated."""
-
-    def parallel_map(self, problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T], /) -> list[R]:
-        """`look(problem, thing)` of each, in their order."""

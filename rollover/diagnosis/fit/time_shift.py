@@ -45,7 +45,10 @@ def align(problem: Problem) -> None:
 
 
 def shifts_from_contact(
-    problem: Problem, candidates: Sequence[Candidate], x: Sequence[float], parallel_map: ParallelMap = serial_map
+    problem: Problem,
+    candidates: Sequence[Candidate],
+    x: Sequence[float],
+    parallel_map: ParallelMap[Problem] = serial_map,
 ) -> list[float | None]:
     """Time shift (s) of each recording by its first contact; None where nothing comes of it."""
     return parallel_map(problem, partial(_by_contact, beside=(candidates, x)), range(len(problem.dataset)))
@@ -82,7 +85,9 @@ def _first_contact(problem: Problem, r: int, made: Made) -> float | None:
     )  # the model leads away from it
 
 
-def clock_outliers(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> list[tuple[str, float]]:
+def clock_outliers(
+    problem: Problem, fitted: Fitted, parallel_map: ParallelMap[Problem] = serial_map
+) -> list[tuple[str, float]]:
     """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by."""
     if not problem.effort.is_timed:
         return []
@@ -90,7 +95,7 @@ def clock_outliers(problem: Problem, fitted: Fitted, parallel_map: ParallelMap =
     return [(e.name, at) for e, at in zip(problem.dataset, found, strict=True) if at is not None]
 
 
-def is_explained_by_clocks(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> bool:
+def is_explained_by_clocks(problem: Problem, fitted: Fitted, parallel_map: ParallelMap[Problem] = serial_map) -> bool:
     """Whether such shifts are all that separates the recordings from a fit: each else is met as it stands."""
     late = {name for name, _ in clock_outliers(problem, fitted, parallel_map)}
     others = [b for e, b in zip(problem.dataset, fitted.blocks, strict=True) if e.name not in late]
@@ -269,3 +274,14 @@ def _early(problem: Problem, r: int, raws: Array, shifts: Array) -> Array:
             inside = time < max([TUNING.early_window, *after])  # a record may end before
             total[k] += worth * float(np.sum(each[k][inside]))
     return total
+
+
+def with_shifts_near_prior(problem: Problem, base: Fitted) -> Fitted:
+    """A base with its time shifts no further from where known clocks say than their error."""
+    blocks = []
+    for r, b in enumerate(base.blocks):
+        known = problem.dataset[r].recording.clock.zero != "unknown"
+        there = min(max(b.shift, -b.prior), b.prior) if known else b.shift
+        new = problem.block(r, base.candidates, base.x, there, problem.effort.fine) if there != b.shift else b
+        blocks.append(new or b)
+    return replace(base, blocks=tuple(blocks))

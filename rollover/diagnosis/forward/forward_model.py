@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from functools import cached_property, lru_cache
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, largest_jump_nearby
 from rollover.diagnosis.forward.filtering import Rows, filtered_like, rows_of
 from rollover.diagnosis.forward.full_run import SENSORS, RunSimulator
+from rollover.diagnosis.forward.interface import EDGES, Array, Simulator
 from rollover.diagnosis.settings import SETTINGS
-from rollover.diagnosis.settings.forward import Effort
 from rollover.dynamics.drop_test import BESIDE, DropFailedError, DropModel, Track, channels_of, unfit
 from rollover.effects import every, read
 from rollover.recording import Recording
@@ -22,50 +21,8 @@ from rollover.scenario import Scenario
 from rollover.spec.document import Itself, exchanged
 from rollover.spec.initiation import Drop
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
-EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
 TUNING = SETTINGS.forward.drop
-
-
-class Simulator(Protocol):
-    """One recording's test, ready to be run with values exchanged by path."""
-
-    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
-        """Channels (n,) at the recording's stamps less `shift` (s); None if the simulation fails."""
-
-    def perturbed(
-        self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
-    ) -> list[dict[str, Array]]:
-        """What runs with `changes` that nobody could tell apart differ by, (n,) at the stamps less `shift`, s.
-
-        Each step of theirs is one of at least `parts` of the scenario's.
-        """
-
-    def choose_medoid(self) -> None:
-        """Of runs that nobody could tell apart take the one that is the most like all."""
-
-    def until(self, n: int) -> Simulator:
-        """The same for the first n stamps."""
-
-    def marks(self) -> tuple[tuple[float, str], ...]:
-        """(start s, name) of the phases of the scenario as it is; empty if the recording itself tells."""
-
-    def state(self, shift: float) -> Mapping[str, Array]:
-        """Motion of the scenario as it is, recorded or not, (n,) each; empty if it cannot be simulated."""
-
-    @property
-    def contact(self) -> float:
-        """When a scenario as it is first touches the ground, s; infinite if it never does or none can tell."""
-
-    @property
-    def effort(self) -> Effort:
-        """How much may be simulated."""
-
-
-def first_impact_of(simulator: Simulator) -> float:
-    """When the scenario as it is first hits the ground with more than its wheels, s; infinite if it never does."""
-    return next((at for at, name in simulator.marks() if name == "impact"), np.inf)
 
 
 class DropSimulator:
@@ -265,4 +222,4 @@ def _under(scenario: Scenario, conditions: Mapping[str, Any], title: str) -> Sce
     return replace(found, **{name: old for name, (old, new) in own.items() if new == old})
 
 
-__all__ = ["DropSimulator", "RunSimulator", "Simulator", "first_impact_of", "set_up", "simulator_of"]
+__all__ = ["DropSimulator", "RunSimulator", "set_up", "simulator_of"]

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.fit.time_shift import shifts_from_contact
 from rollover.diagnosis.inference.bases import ACCELERATION, DEPTH, SPEED, TIME, linear_b_splines
@@ -88,7 +89,7 @@ def _steady(N: Array) -> Array:
 
 
 def dependence(
-    problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap = serial_map
+    problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap[Problem] = serial_map
 ) -> Dependence:
     """What is left beside a fit depends on what; `scenarios` under the conditions of the recordings."""
     dataset = problem.dataset
@@ -115,7 +116,7 @@ def dependence_of_one(problem: Problem, base: Fitted, before: Mismatch) -> Depen
 
 
 def loading_paths(
-    problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap = serial_map
+    problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap[Problem] = serial_map
 ) -> tuple[list[list[ResidualBlock]], list[Descent]]:
     """Each recording at some time shifts, and its way down at the best of them."""
     shifts = shifts_from_contact(problem, base.candidates, base.x, parallel_map)
@@ -182,7 +183,7 @@ def without_shift_directions(w: Array, slope: Array, prior: float) -> Array:
 
 
 def _of_forces(
-    problem: Problem, found: Sequence[Descent], parallel_map: ParallelMap
+    problem: Problem, found: Sequence[Descent], parallel_map: ParallelMap[Problem]
 ) -> tuple[list[Model], list[Array], float, float]:
     """Every model of a force, the misfits, the noise's part of them, and phi."""
     misfits = [without_shift_directions(d.residual[d.rows], d.slope[d.rows], d.prior) for d in found]

@@ -16,8 +16,8 @@ from rollover.diagnosis.fit.ensemble_mean import (
     ensemble_mean_step,
     projected_gradient,
 )
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import ResidualBlock, at_an_end, time_shift_step
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, at_an_end, time_shift_step
 from rollover.diagnosis.fit.local_search import linearised
 from rollover.diagnosis.fit.parameterisation import Candidate, physical, with_slices
 from rollover.diagnosis.inference.local_quadratic import roughness_extents, student_widening

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.calibration.posterior import sampled
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import with_slices
 from rollover.diagnosis.result import Draws
 from rollover.diagnosis.settings import SETTINGS

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ground.law import REFERENCE_AREA, along
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.forward.filtering import filtered_like, rows_of
 from rollover.diagnosis.inference.bases import linear_b_splines
 from rollover.diagnosis.inference.newmark import newmark_response

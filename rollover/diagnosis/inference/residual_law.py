@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from ground.empirical import MOST, TERMS
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.weak_form import Balance, balances

@@ -10,7 +10,8 @@ import numpy as np
 from rollover.comparison.rating import Iso18571, iso18571
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Held, held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, time_shift_step
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, time_shift_step
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.result import Score
 from rollover.diagnosis.settings import SETTINGS

@@ -24,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.inference.bases import TIME, linear_b_splines
 from rollover.diagnosis.result import Degree
 from rollover.diagnosis.settings import SETTINGS

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal, noise_from_differences
-from rollover.diagnosis.forward.forward_model import first_impact_of
+from rollover.diagnosis.forward.interface import first_impact_of
 from rollover.diagnosis.noise.drift import is_recorder_noise
 from rollover.diagnosis.noise.spectral_lines import lines, without, without_outliers
 from rollover.diagnosis.settings import SETTINGS

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.forward.forward_model import first_impact_of
+from rollover.diagnosis.forward.interface import first_impact_of
 from rollover.diagnosis.noise.autoregression import signals_of_one_recorder
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording.noise_floor import LENGTH, USUAL

@@ -16,7 +16,7 @@ from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.step import Inquiry
-from rollover.diagnosis.forward.failed_model import FailedModelError
+from rollover.diagnosis.forward.interface import FailedModelError
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.invariants import checked
 from rollover.diagnosis.own_model.declaration import BASELINE, ForwardModel, declared

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal, dataset_of
 from rollover.diagnosis.data.quantisation import with_quantisation, without_spikes
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import ended
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.own_model.declaration import ForwardModel, conditions_of

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.forward.failed_model import FailedModelError
+from rollover.diagnosis.forward.interface import FailedModelError
 from rollover.diagnosis.own_model.declaration import BASELINE, ForwardModel, conditions_of, file_of, values_of
 from rollover.diagnosis.own_model.tables import enter, stretches
 from rollover.diagnosis.settings import SETTINGS

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.planning.planned import Instruments, planned, showing
 from rollover.diagnosis.planning.separation import Tests

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import without_shift_direction
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.planning.planned import showing
 from rollover.diagnosis.planning.strength import choice, scaled

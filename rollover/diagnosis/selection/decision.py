@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rollover.diagnosis.data.phases import Phases
 from rollover.diagnosis.fit.cross_validation import Groups, held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import at_an_end, first_effect_last
-from rollover.diagnosis.fit.local_search import all_but_one, left_at, without_effect
-from rollover.diagnosis.fit.parameterisation import Candidate, is_one_sensor, with_slices
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, at_an_end, first_effect_last
+from rollover.diagnosis.fit.local_search import without_effect
+from rollover.diagnosis.fit.parameterisation import is_one_sensor, with_slices
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, is_enough, is_tolerated, matters, mismatch_of
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.ensemble_validation import counted_in_full, significant_by_wald
+from rollover.diagnosis.selection.explanation import Explanation, kind_of, strongest, with_conditions_refitted
 from rollover.diagnosis.selection.flexibility import is_a_curve, is_flexible_soil, is_over_flexible, is_straight_line
 from rollover.diagnosis.selection.forward_step import largest_change
 from rollover.diagnosis.selection.pairs import best_subsets, with_first_replaced
-from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.simplification import followed, with_mirror_rivals
-from rollover.diagnosis.selection.stepwise import forward_selection, with_conditions_refitted
+from rollover.diagnosis.selection.stepwise import forward_selection
 from rollover.diagnosis.selection.truncated_start import loading_first
 from rollover.diagnosis.settings import SETTINGS
 
@@ -31,45 +31,6 @@ MOST_EFFECTS = SETTINGS.selection.flexibility.most_effects
 P_VALUE = SETTINGS.inference.lack_of_fit.p_value
 FULL_P_VALUE = SETTINGS.selection.simplification.full_p_value
 LEAST_GAIN = SETTINGS.selection.ensemble_validation.least_gain
-
-
-@dataclass(frozen=True, kw_only=True)
-class Explanation:
-    """What was selected: the base, the fit (the base itself if nothing), a step for each of its effects.
-
-    Each step's base is the fit without that effect, so that its rivals competed beside all the others. `first` is the
-    first step, taken or not; `looked` what all candidates scored beside the base; `detectable` the strength at which
-    each would have shown, beside the explanation for those that are not in it.
-    """
-
-    base: Fitted
-    fitted: Fitted
-    parts: tuple[Step, ...]
-    looked: ScoreTest
-    detectable: Mapping[str, float]
-    before: Mismatch
-    after: Mismatch
-    first: Step | None = None
-    refuted: bool = False  # whether the best candidate's gain did not outlast the scatter of its own runs
-    settled: bool = True  # whether as many effects as may be are these, and not any that can be bent to what is there
-
-    def refused(self) -> Explanation:
-        """The same with nothing held to be found."""
-        return replace(self, parts=(), fitted=self.base, after=self.before)
-
-    @property
-    def p_value(self) -> float:
-        """Of "nothing but noise": min over two tests of 1 - (1 - p)^(1/a), a their shares of all errors (Sidak).
-
-        The omnibus test's p and the best candidate's, half each; where runs scatter nearly all is the first one's: the
-        second is rarely small by chance there, as weights and neighbours lower every score. A candidate that was looked
-        at closer and refuted tells nothing.
-        """
-        if self.refuted:
-            return self.before.p_value
-        share = TUNING.look_share if any(b.expected is not None for b in self.base.blocks) else 0.5
-        tests = ((self.before.p_value, 1.0 - share), (self.looked.p_value(), share))
-        return float(min(-np.expm1(np.log1p(-min(p, TUNING.largest_p_value)) / a) for p, a in tests))
 
 
 def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
@@ -306,29 +267,6 @@ def by_first_effect(problem: Problem, found: Explanation, nothing: Collection[st
     one = one.again(problem)
     one, after = with_conditions_refitted(problem, one, mismatch_of(problem.dataset, one.fitted.blocks, phases), phases)
     return replace(found, parts=(one,), fitted=one.fitted, after=after)
-
-
-def kind_of(c: Candidate) -> Verdict:
-    """The verdict on what an effect explains."""
-    return "missing-physics" if c.kind == "physics" else "parameter" if c.kind == "parameter" else "sensor"
-
-
-def strongest(problem: Problem, base: Fitted, fitted: Fitted) -> Candidate:
-    """The effect without which most would be left; of full runs, where fits are dear, with the others as they stand."""
-    best, loss = fitted.effects[0], -np.inf
-    for k, c in enumerate(fitted.effects, fitted.first):
-        if len(fitted.effects) == 1:
-            return c
-        if problem.effort.is_ensemble:
-            others, columns = all_but_one(fitted, k)
-            left = left_at(problem, others, [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks])
-        else:
-            rest = without_effect(problem, fitted, k, rounds=4)
-            left = rest.left if rest is not None else None
-        left = base.left if left is None else left
-        if left > loss:
-            best, loss = c, left
-    return best
 
 
 def is_negligible_effect(problem: Problem, first: Step | None, phases: Phases) -> bool:

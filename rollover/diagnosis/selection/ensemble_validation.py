@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.cross_validation import Groups, held_out
-from rollover.diagnosis.fit.ensemble_mean import ensemble_mean_misfit, refined_under_scatter
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.ensemble_mean import ensemble_mean_misfit, fitted_to_ensemble_mean
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate, physical, same_family
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.inference.intervals import intervals
@@ -33,17 +34,6 @@ def restarted_base(problem: Problem, base: Fitted) -> Fitted:
     """
     again = problem.fit(base.candidates, base.x, shifts=initial_time_shifts(problem, base))
     return min((f for f in (base, again) if f is not None), key=lambda f: sum(b.total for b in f.blocks))
-
-
-def with_shifts_near_prior(problem: Problem, base: Fitted) -> Fitted:
-    """A base with its time shifts no further from where known clocks say than their error."""
-    blocks = []
-    for r, b in enumerate(base.blocks):
-        known = problem.dataset[r].recording.clock.zero != "unknown"
-        there = min(max(b.shift, -b.prior), b.prior) if known else b.shift
-        new = problem.block(r, base.candidates, base.x, there, problem.effort.fine) if there != b.shift else b
-        blocks.append(new or b)
-    return replace(base, blocks=tuple(blocks))
 
 
 def with_full_weights(problem: Problem, fitted: Fitted) -> Fitted:
@@ -189,3 +179,11 @@ def _gains(found: Step, groups: Groups) -> Array:
     """What each recording gains (k,) where it is held out, over what is left per sample."""
     with_, without_ = held_out(found.fitted, groups), held_out(found.base, groups)
     return np.asarray((without_.left - with_.left) / max(1.0, float(with_.left.sum() / with_.count.sum())))
+
+
+def refined_under_scatter(problem: Problem, step: Step) -> Step:
+    """A step moved to where its fit meets the mean of its own runs best (D8), beside a base under that scatter.
+
+    Its rivals are not put under it: that costs runs, see `Step.again`.
+    """
+    return replace(step.moved_to(fitted_to_ensemble_mean(problem, step.fitted)), base=problem.again(step.base))

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.phases import Phases
 from rollover.diagnosis.fit.cross_validation import Groups, cross_validated_by_refits, held_out, held_out_disadvantage
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.linearisation import at_an_end
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, ends_at_bound
 from rollover.diagnosis.fit.local_search import completed_shifts
 from rollover.diagnosis.fit.step import Inquiry, Screened, Step
 from rollover.diagnosis.fit.tasks import Task
@@ -350,8 +350,3 @@ def confusion(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
         if as_well or min(held_out_disadvantage(rival, best, groups, shared)) < TUNING.excluded_errors:
             found.append(rival)
     return found
-
-
-def ends_at_bound(fitted: Fitted) -> bool:
-    """Whether a number of the last effect stands at an end of its range."""
-    return any(at_an_end(v) for v in fitted.own)

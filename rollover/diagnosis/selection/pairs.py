@@ -8,8 +8,8 @@ from dataclasses import replace
 from functools import partial
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import first_effect_last
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, first_effect_last
 from rollover.diagnosis.fit.local_search import completed_shifts, representative_recordings, without_effect
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry, Step

@@ -9,11 +9,12 @@ from itertools import zip_longest
 import numpy as np
 
 from rollover.diagnosis.fit.cross_validation import Groups
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import left_at
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
-from rollover.diagnosis.selection.ensemble_validation import with_shifts_near_prior
+from rollover.diagnosis.fit.time_shift import with_shifts_near_prior
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value, score_test
 from rollover.diagnosis.selection.screening import initial_time_shifts, representative_few
 from rollover.diagnosis.settings import SETTINGS
@@ -28,7 +29,7 @@ def look(
     groups: Groups,
     beside: Fitted | None = None,
     few: Sequence[int] = (),
-    parallel_map: ParallelMap = serial_map,
+    parallel_map: ParallelMap[Problem] = serial_map,
 ) -> ScoreTest:
     """A gate by all recordings; where each look costs a run, of few and then of the best candidates by some more.
 
@@ -142,7 +143,7 @@ def rescored(
     candidates: Sequence[Candidate],
     groups: Groups,
     first: ScoreTest,
-    parallel_map: ParallelMap = serial_map,
+    parallel_map: ParallelMap[Problem] = serial_map,
 ) -> ScoreTest:
     """A look beside an explanation; where looks cost runs, by what candidates move beside the `base`, if that is given.
 

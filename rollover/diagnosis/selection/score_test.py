@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.linearisation import without_shift_direction
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, without_shift_direction
 from rollover.diagnosis.fit.parameterisation import (
     Candidate,
     followed,
@@ -80,7 +80,7 @@ def score_test(
     candidates: Sequence[Candidate],
     only: Sequence[int] | None = None,
     beside: Fitted | None = None,
-    parallel_map: ParallelMap = serial_map,
+    parallel_map: ParallelMap[Problem] = serial_map,
 ) -> ScoreTest:
     """Look at every candidate beside the base, in all recordings or `only` some, from the base's own time shifts.
 

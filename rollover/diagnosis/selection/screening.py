@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.linearisation import without_shift_direction
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate, same_family
 from rollover.diagnosis.fit.step import Inquiry, Screened
 from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
@@ -40,7 +40,7 @@ def is_far(problem: Problem, base: Fitted) -> bool:
     return base.left > far**2 * sum(b.residual.size for b in base.blocks)
 
 
-def initial_time_shifts(problem: Problem, base: Fitted, parallel_map: ParallelMap = serial_map) -> list[float]:
+def initial_time_shifts(problem: Problem, base: Fitted, parallel_map: ParallelMap[Problem] = serial_map) -> list[float]:
     """Time shifts (s) to begin with: where the base is off its own are bent by what is missing, the contact's hardly.
 
     Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left.

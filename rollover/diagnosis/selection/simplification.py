@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import first_effect_last
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ends_at_bound, first_effect_last
 from rollover.diagnosis.fit.local_search import ended, polish, with_time_shift_search, without_effect
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinates, with_slices
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
 from rollover.diagnosis.selection.flexibility import is_over_flexible
-from rollover.diagnosis.selection.forward_step import ends_at_bound
 from rollover.diagnosis.selection.restarts import continued_from, with_thresholds_traced
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS

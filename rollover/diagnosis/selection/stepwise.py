@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import TypeGuard
 
 from rollover.diagnosis.data.phases import Phases
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import (
-    has_uncertain_conditions,
-    refitted_with_conditions,
     with_time_shift_search,
 )
 from rollover.diagnosis.fit.step import Inquiry, Step
@@ -23,6 +22,7 @@ from rollover.diagnosis.selection.ensemble_validation import (
     with_full_weights,
     without_unsupported_rivals,
 )
+from rollover.diagnosis.selection.explanation import with_conditions_refitted
 from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.forward_step import largest_change, size_of_effect, step, with_noise_of_fit
 from rollover.diagnosis.selection.pairs import best_subsets, with_first_exchanged
@@ -224,19 +224,3 @@ def with_other_weighting(inquiry: Inquiry, current: Fitted) -> Step | None:
     if found is None:
         problem.heavy_tailed = before
     return found
-
-
-def with_conditions_refitted(problem: Problem, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
-    """A step and what it leaves; with the errors of the conditions as they act beside it if that leaves chance alone.
-
-    Else these stay as they act on the scenario as it is: a wrong effect would bend them too.
-    """
-    if is_enough(problem, found.fitted, left) or not has_uncertain_conditions(problem):
-        return found, left
-    before = problem.dataset
-    new = refitted_with_conditions(problem, found.fitted)
-    there = mismatch_of(problem.dataset, new.blocks, phases)
-    if is_enough(problem, new, there):
-        return found.moved_to(new), there
-    problem.with_noise_model(before)
-    return found, left

@@ -15,7 +15,8 @@ import numpy as np
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.phases import PEAK
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.fit.time_shift import align
