@@ -18,7 +18,7 @@ from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import has_uncertain_conditions, refitted_with_conditions
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry, Step
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.grades import graded, with_shares
 from rollover.diagnosis.inference.discrepancy import Discrepancy
@@ -77,8 +77,9 @@ class Asked:
 class Conclusion:
     """What recordings say: the explanation, its verdict and grade, and what it was drawn from.
 
-    `tried` is the explanation before what does not explain was refused, `slight` are effects of no consequence, `shown`
-    is what recordings show by themselves, `validation` are those that were held out, `groups` what is left out in turn.
+    `tried` is the explanation before what does not explain was refused, `slight` are effects of no consequence,
+    `recording_fault` is what recordings show by themselves, `validation` are those that were held out, `groups` what is
+    left out in turn.
     """
 
     asked: Asked
@@ -89,7 +90,7 @@ class Conclusion:
     grade: Answer
     effects: tuple[Named, ...]
     slight: tuple[Named, ...]
-    shown: RecordingFault | None
+    recording_fault: RecordingFault | None
     validation: tuple[Dataset, ...]
     groups: Groups
     candidates: Sequence[Candidate]
@@ -125,7 +126,7 @@ def concluded(
         notes.append("one condition only: what stands as held out is predicted by the fit to it")
     problem = Problem(found)
     executor.begin(problem)
-    align(problem)
+    estimate_time_shifts(problem)
     base = problem.fit((), ())
     if base is None:
         return cannot_tell(every, names, [*notes, "the scenario itself could not be simulated"], began)
@@ -136,7 +137,7 @@ def concluded(
     inquiry = Inquiry(
         problem=problem, candidates=candidates, groups=groups, phases=phases, say=asked.say, executor=executor
     )
-    return weighed(
+    return conclusion_of(
         asked,
         inquiry,
         base,
@@ -148,7 +149,7 @@ def concluded(
     )
 
 
-def weighed(
+def conclusion_of(
     asked: Asked,
     inquiry: Inquiry,
     base: Fitted,
@@ -184,21 +185,21 @@ def weighed(
 
     explanation, verdict = decide(explanation)
     held, named_so = problem.dataset, name_all(explanation, verdict)
-    nothing: set[str] = set()
+    refuted: set[str] = set()
     while (
         more := redundant_effects(problem, named_so[0], interval_contains_null(named_so[1], problem.effort.is_ensemble))
-        - nothing
+        - refuted
     ):
         # what may as well be nothing is none of it: what came first explains what there is alone, or nothing does
-        nothing |= more
+        refuted |= more
         problem.with_noise_model(held)
-        alone = by_first_effect(problem, explanation, nothing, phases)
+        alone = by_first_effect(problem, explanation, refuted, phases)
         explanation, verdict = decide(alone)
         named_so = name_all(explanation, verdict)
-    while more := rejected_effects(problem, *named_so[:2], groups, in_doubt=asked.estimates) - nothing:
-        nothing |= more
+    while more := rejected_effects(problem, *named_so[:2], groups, in_doubt=asked.estimates) - refuted:
+        refuted |= more
         problem.with_noise_model(held)
-        explanation, verdict = decide(next_best(problem, explanation, nothing, groups, phases))
+        explanation, verdict = decide(next_best(problem, explanation, refuted, groups, phases))
         named_so = name_all(explanation, verdict)
     explanation, effects, validation = named_so
     effects = clear_of_null(problem, explanation, effects) if asked.estimates else effects
@@ -214,20 +215,20 @@ def weighed(
     slight = effects if asked.estimates and grade == "immaterial" else ()
     if asked.estimates and (slight or (effects and grade == "unexplained")):
         verdict, effects, explanation = "no-mismatch" if slight else "unexplained", (), explanation.refused()
-    shown = None
+    recording_fault = None
     if verdict == "no-mismatch":
-        shown = intrinsic_faults(found, recordings, phases, explanation.p_value) or misread(
+        recording_fault = intrinsic_faults(found, recordings, phases, explanation.p_value) or misread(
             inconsistencies, len(found), explanation.p_value
         )
     elif effects and explains_little(explanation, groups, TUNING.main_share):
         # what is lost again and again is met by no effect, and bends those that are fitted to it
-        shown = truncation_fault(found, recordings, phases, explanation.p_value)
-        if shown is not None and not (
-            explains_little(explanation, groups) or shown.is_covered_by(e.channel for e in effects)
+        recording_fault = truncation_fault(found, recordings, phases, explanation.p_value)
+        if recording_fault is not None and not (
+            explains_little(explanation, groups) or recording_fault.is_covered_by(e.channel for e in effects)
         ):
-            shown = None  # what another channel loses is no reason to doubt them
-    if shown is not None:
-        verdict, effects = shown.verdict, shown.effects
+            recording_fault = None  # what another channel loses is no reason to doubt them
+    if recording_fault is not None:
+        verdict, effects = recording_fault.verdict, recording_fault.effects
         explanation = explanation.refused()
     notes += pull_notes(problem, explanation.fitted)
     return Conclusion(
@@ -239,7 +240,7 @@ def weighed(
         grade=grade,
         effects=effects,
         slight=slight,
-        shown=shown,
+        recording_fault=recording_fault,
         validation=tuple(validation),
         groups=groups,
         candidates=inquiry.candidates,

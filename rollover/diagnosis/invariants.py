@@ -11,7 +11,7 @@ import numpy as np
 from rollover.diagnosis.data.phases import Phases
 from rollover.diagnosis.fit.cross_validation import Groups, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.linearisation import Fitted, ends_at_bound
+from rollover.diagnosis.fit.linearisation import Fitted, is_at_bound
 from rollover.diagnosis.fit.parameterisation import coordinate, physical, strength_parameter
 from rollover.diagnosis.inference.intervals import held_at
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
@@ -50,7 +50,7 @@ def rejected_effects(
         return {e.id for e in effects}
     if not in_doubt:
         left, rivals = float(after.left.sum()), found.first.rivals if found.first is not None else ()
-        better = any(not ends_at_bound(f) and float(held_out(f, groups).left.sum()) < left for f in rivals)
+        better = any(not is_at_bound(f) and float(held_out(f, groups).left.sum()) < left for f in rivals)
         return at_bounds(effects) if better else set()
     null = {e.id for e in effects if may_be_null(e)}
     if len(effects) == 1 and null and is_clear_of_null(problem, found.fitted):
@@ -140,7 +140,7 @@ def next_best(
     able = [
         f
         for f in first.rivals
-        if f.candidates[-1].id not in out and not ends_at_bound(f) and start - left[f.label] > TUNING.rival_share * most
+        if f.candidates[-1].id not in out and not is_at_bound(f) and start - left[f.label] > TUNING.rival_share * most
     ]
     if not able:
         return found.refused()

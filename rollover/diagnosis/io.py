@@ -10,7 +10,7 @@ from typing import Any
 
 from rollover.assessment.results import plain, versions
 from rollover.calibration import posterior
-from rollover.diagnosis.result import Diagnosis, Draws, Interval, Law, Named, Place, Score
+from rollover.diagnosis.result import Diagnosis, Draws, Interval, Law, Location, Named, Score
 from rollover.effects import nth
 from rollover.recording import Recording
 from rollover.recording.importers import read_named
@@ -43,7 +43,7 @@ def json_of(
             },
             "smallest_detectable": {k: v for k, v in found.smallest_detectable.items() if isfinite(v)},
             "significance": {"p_value": found.p_value, "noise": dict(found.noise)},
-            "where": [_place(p) for p in found.where],
+            "where": [_location(p) for p in found.where],
             "depends_on": found.depends_on,
             "dependencies": [{"on": name, "share": share} for name, share in found.dependencies],
             "degrees_of_freedom": [asdict(d) for d in found.degrees],
@@ -75,8 +75,8 @@ def _posterior(drawn: Draws) -> dict[str, Any]:
     return posterior.summary(drawn.names, drawn.values, drawn.convergence, prior)
 
 
-def _place(place: Place) -> dict[str, Any]:
-    return asdict(place)
+def _location(location: Location) -> dict[str, Any]:
+    return asdict(location)
 
 
 def _effect(effect: Named) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from rollover.diagnosis.data.onset import clock_notes, with_clock_zeros
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
-from rollover.diagnosis.fit.time_shift import align, clock_outliers, is_explained_by_clocks
+from rollover.diagnosis.fit.time_shift import clock_outliers, estimate_time_shifts, is_explained_by_clocks
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference.discrepancy import Discrepancy, estimated, learned_from_references, with_discrepancy
 from rollover.diagnosis.inference.wrong_condition import wrong_conditions
@@ -146,7 +146,7 @@ def _answered(found: Conclusion | Diagnosis, every: Sequence[Dataset], notes: Se
 
 def _second_opinion(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]) -> Diagnosis | None:
     """What clocks, or an effect beside a discrepancy, say of recordings that nothing explains beside their noise."""
-    if found.shown is not None:
+    if found.recording_fault is not None:
         return None
     found = replace(found, asked=replace(found.asked, estimates=True))
     return _with_clocks_corrected(found, every, notes) or _beside_estimated_discrepancy(found, every, notes)
@@ -175,8 +175,10 @@ def _beside_estimated_discrepancy(
             )
     if isinstance(other, Diagnosis):
         return None
-    is_told = bool(other.effects) or (other.verdict == "no-mismatch" and learned.is_usual and not _is_reproduced(other))
-    return reported(other) if is_told else None
+    says_more = bool(other.effects) or (
+        other.verdict == "no-mismatch" and learned.is_usual and not _is_reproduced(other)
+    )
+    return reported(other) if says_more else None
 
 
 def _is_reproduced(found: Conclusion) -> bool:
@@ -203,7 +205,7 @@ def _learned_from_references(
     learned = None
     if usable:
         problem = Problem(weighted_datasets(scenario, usable))
-        align(problem)
+        estimate_time_shifts(problem)
         base = problem.fit((), ())
         learned = None if base is None else learned_from_references(problem, base)
     return [e for e in every if e.name not in reference], learned

@@ -15,7 +15,7 @@ from rollover.effects import EFFECTS
 TUNING = SETTINGS.report.power
 
 
-def is_weak(detectable: Mapping[str, float]) -> bool:
+def is_underpowered(detectable: Mapping[str, float]) -> bool:
     """Whether even typical strengths of most effects would have stayed below what shows; of all, where no ground acts.
 
     How many others there are is a matter of the vehicle, not of what its recordings tell.

@@ -11,7 +11,7 @@ from rollover.diagnosis.data.quantisation import with_quantisation, without_spik
 from rollover.diagnosis.data.repeatability import with_scatter
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import compared
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.forward.full_run import full_runs
@@ -19,7 +19,7 @@ from rollover.diagnosis.forward.interface import first_impact_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.ensemble import with_sample_weights
 from rollover.diagnosis.noise.heteroscedasticity import with_variance_model
-from rollover.diagnosis.noise.offsets import with_zeros
+from rollover.diagnosis.noise.offsets import with_offsets_removed
 from rollover.diagnosis.noise.truncation import shortened
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -69,12 +69,12 @@ def with_common_noise(scenario: Scenario, every: Sequence[Dataset]) -> list[Data
     """The recordings with the noise of those alike taken together, from their quiet stretches."""
     every = [with_uncertain_conditions(e, set_up(scenario, e.recording)) for e in with_scatter(every)]
     problem = Problem(every)
-    align(problem)
+    estimate_time_shifts(problem)
     base = problem.fit((), (), rounds=2)
     if base is None:
         return list(every)
     residuals, shifts = problem.residuals(base), [b.shift for b in base.blocks]
-    return with_zeros(autoregression.with_noise_of_quiet_stretches(every, residuals), residuals, shifts)
+    return with_offsets_removed(autoregression.with_noise_of_quiet_stretches(every, residuals), residuals, shifts)
 
 
 def weighted_datasets(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:

@@ -70,7 +70,7 @@ def _beside_noise(problem: Problem, tried: Explanation, found: Explanation) -> I
 
     every = [(NOTHING, 0.0)]
     if first is None:  # nothing was fitted: what a look says that it would gain
-        every += [(key.partition(":")[0], evidence(score, 1)) for key, score in tried.looked.scores.items()]
+        every += [(key.partition(":")[0], evidence(score, 1)) for key, score in tried.scored.scores.items()]
     every += [(f.candidates[-1].id, evidence(base.left - f.left, len(f.x))) for f in fits]
     if len(found.fitted.effects) > 1:
         name = strongest(problem, found.base, found.fitted).id

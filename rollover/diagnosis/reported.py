@@ -21,7 +21,7 @@ from rollover.diagnosis.inference.residual_law import offered, proposed
 from rollover.diagnosis.inference.scores import judged, misfit_before_impact
 from rollover.diagnosis.inference.vehicle_dependence import dependency, misfit_by_degree_of_freedom
 from rollover.diagnosis.planning.next_test import next_test
-from rollover.diagnosis.power import is_weak
+from rollover.diagnosis.power import is_underpowered
 from rollover.diagnosis.probabilities import NOTHING, probabilities
 from rollover.diagnosis.result import Degree, Diagnosis, Draws, Named, Share
 from rollover.diagnosis.settings import SETTINGS
@@ -30,9 +30,9 @@ from rollover.diagnosis.statements import (
     candidate_table,
     closest_candidate_sentence,
     immaterial_sentence,
+    locations,
     no_contact_clause,
     noise,
-    places,
     sentence,
     step_error_note,
     tolerance_clause,
@@ -43,17 +43,17 @@ from rollover.effects import spoken
 
 def reported(c: Conclusion) -> Diagnosis:
     """A conclusion as it is reported, with what the mismatch depends on."""
-    asked, problem, explanation, shown, verdict, effects = (
+    asked, problem, explanation, recording_fault, verdict, effects = (
         c.asked,
         c.problem,
         c.explanation,
-        c.shown,
+        c.recording_fault,
         c.verdict,
         c.effects,
     )
     executor, groups, found, set_ups = asked.executor, c.groups, list(problem.dataset), c.set_ups
     before, after = explanation.before, explanation.after
-    is_mismatch = verdict not in ("no-mismatch", "cannot-tell") and shown is None
+    is_mismatch = verdict not in ("no-mismatch", "cannot-tell") and recording_fault is None
     asked.say("what the mismatch depends on")
     depends_on = Dependence()
     degrees: tuple[Degree, ...] = ()
@@ -65,14 +65,14 @@ def reported(c: Conclusion) -> Diagnosis:
         of_motion = Dependence(shares=dependency(problem, explanation.base))
         depends_on = of_motion if of_one is None or of_one.yields_to(of_motion) else of_one
     law = None
-    if verdict == "unexplained" and c.acts == "drop" and shown is None:
+    if verdict == "unexplained" and c.acts == "drop" and recording_fault is None:
         asked.say("a law for the unexplained residual")
         law = proposed(problem, explanation.base, set_ups, found, groups)
     told_of = {} if asked.discrepancy is None else asked.discrepancy.scales_by_channel(found)
     shares = {} if asked.discrepancy is None else {k: asked.discrepancy.scales[k] for k in told_of}
     detectable = dict(explanation.detectable)
     contrary = inconsistent_repeats(found, SETTINGS.data.repeatability.contradiction)
-    if verdict == "no-mismatch" and not c.slight and (contrary or is_weak(detectable)):
+    if verdict == "no-mismatch" and not c.slight and (contrary or is_underpowered(detectable)):
         verdict = "cannot-tell"
     h_before, h_after = (judged(problem, f, c.validation, groups) for f in (explanation.base, explanation.fitted))
     early = (
@@ -82,9 +82,9 @@ def reported(c: Conclusion) -> Diagnosis:
     remains = not (c.is_beside and is_tolerated(problem, explanation.fitted)) and not is_enough(
         problem, explanation.fitted, after
     )
-    by_itself = () if shown is None else shown.places
+    by_itself = () if recording_fault is None else recording_fault.locations
     lost = by_itself if verdict == "unexplained" else ()
-    is_left = (verdict == "unexplained" and shown is None) or (bool(effects) and remains)
+    is_left = (verdict == "unexplained" and recording_fault is None) or (bool(effects) and remains)
     training = tuple(e.name for e in found)
     notes = [
         *c.notes,
@@ -95,8 +95,8 @@ def reported(c: Conclusion) -> Diagnosis:
     return Diagnosis(
         verdict=verdict,
         sentence=(
-            shown.sentence
-            if shown is not None
+            recording_fault.sentence
+            if recording_fault is not None
             else immaterial_sentence(c.slight)
             if c.slight
             else usual_model_error_sentence(asked.discrepancy.scales, explanation.p_value, len(found), _most(c))
@@ -114,21 +114,25 @@ def reported(c: Conclusion) -> Diagnosis:
                 beside=c.is_beside and bool(told_of),
             )
         )
-        + (closest_candidate_sentence(explanation, groups) if verdict == "unexplained" and shown is None else "")
+        + (
+            closest_candidate_sentence(explanation, groups)
+            if verdict == "unexplained" and recording_fault is None
+            else ""
+        )
         + (clock_evidence(clock_outliers(problem, explanation.fitted, executor.parallel_map)) if is_left else "")
-        + (by_share(effects, shares, estimated=c.is_beside) if shown is None else "")
+        + (by_share(effects, shares, estimated=c.is_beside) if recording_fault is None else "")
         + offered(law)
         + inconsistency_evidence(c.inconsistencies)
         + contradiction_clause(verdict, contrary)
         + tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found)
         + no_contact_clause(found),
-        p_value=explanation.p_value if shown is None else shown.p_value,
+        p_value=explanation.p_value if recording_fault is None else recording_fault.p_value,
         noise=noise(found),
-        where=places(before, found, depends_on.on) if is_mismatch else by_itself,
+        where=locations(before, found, depends_on.on) if is_mismatch else by_itself,
         effects=_with_next_test(c),
         remaining_significant=is_left or bool(lost),
         remaining_p_value=after.p_value,
-        remaining_where=places(after, found, None) if is_left else lost,
+        remaining_where=locations(after, found, None) if is_left else lost,
         depends_on=depends_on.on if is_mismatch else next((p.depends_on for p in lost), None),
         dependencies=depends_on.shares,
         degrees=degrees if is_mismatch else (),
@@ -150,7 +154,7 @@ def reported(c: Conclusion) -> Diagnosis:
             verdict, c.grade, explanation.p_value, slight=bool(c.slight), is_beside=asked.discrepancy is not None
         ),
         discrepancy=told_of,
-        by_itself=shown is not None,
+        by_itself=recording_fault is not None,
         posterior=_draws(c) if effects else None,
         probabilities=_probabilities(c, remains=remains),
     )
@@ -158,7 +162,7 @@ def reported(c: Conclusion) -> Diagnosis:
 
 def _probabilities(c: Conclusion, *, remains: bool) -> dict[str, float]:
     """Of each name; none of full runs, of a model of one's own, and of what recordings show by themselves."""
-    if c.acts != "drop" or c.asked.scenario is None or c.shown is not None:
+    if c.acts != "drop" or c.asked.scenario is None or c.recording_fault is not None:
         return {}
     is_noise = not remains and c.problem.samples_per_error == 1.0
     p_value = c.tried.first.p_value if c.is_beside and c.tried.first is not None else 1.0
@@ -170,7 +174,7 @@ def _probabilities(c: Conclusion, *, remains: bool) -> dict[str, float]:
 
 def _draws(c: Conclusion) -> Draws | None:
     """Draws of what is named, where they were asked for; none of what recordings show by themselves."""
-    if not c.asked.draws or c.shown is not None or c.acts != "drop":
+    if not c.asked.draws or c.recording_fault is not None or c.acts != "drop":
         return None
     c.asked.say("samples of the posterior of the numbers")
     return drawn(c.problem, c.explanation.fitted, c.asked.draws)
@@ -178,7 +182,7 @@ def _draws(c: Conclusion) -> Draws | None:
 
 def _with_next_test(c: Conclusion) -> tuple[Named, ...]:
     """The effects, and where two names are in the set what would choose between them, by their fits."""
-    if c.asked.scenario is None or len(c.effects) != 1 or c.shown is not None or not c.explanation.parts:
+    if c.asked.scenario is None or len(c.effects) != 1 or c.recording_fault is not None or not c.explanation.parts:
         return c.effects
     (effect,), step = c.effects, c.explanation.parts[0]
     rivals = [f for f in step.rivals if f.candidates[-1].id in effect.indistinguishable_from]

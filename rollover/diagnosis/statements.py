@@ -18,9 +18,9 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
-from rollover.diagnosis.result import Considered, Named, Place, Score, Share, Verdict
+from rollover.diagnosis.result import Considered, Location, Named, Score, Share, Verdict
 from rollover.diagnosis.selection.explanation import Explanation, strongest
-from rollover.diagnosis.selection.forward_step import confusion
+from rollover.diagnosis.selection.forward_step import confusion_set
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
@@ -33,7 +33,7 @@ def named(
 ) -> tuple[Named, ...]:
     """Effects of an explanation with their intervals and look-alikes, the strongest first.
 
-    `alike` says of a step what cannot be told from its best; by default all that predict no worse (`confusion`).
+    `alike` says of a step what cannot be told from its best; by default all that predict no worse (`confusion_set`).
     Values are those of shorter steps, where runs are integrated: what the scenario's steps take for it is no property
     of what was recorded.
     """
@@ -52,7 +52,7 @@ def named(
         if c.channel is not None:
             values["channel"] = c.channel
         own = by_key[c.key]
-        near = confusion(own, groups, problem.samples_per_error) if alike is None else alike(own)
+        near = confusion_set(own, groups, problem.samples_per_error) if alike is None else alike(own)
         # what was named too is told apart by being beside it
         rivals = [r for r in (f.candidates[-1] for f in near) if r.key not in settings]
         effect = kind(**values)
@@ -234,10 +234,10 @@ def closest_candidate_sentence(found: Explanation, groups: Sequence[Sequence[int
     return f" The closest, {last.id}{of}, leaves {end:.2f} times the noise, with structure in it."
 
 
-def places(mismatch: Mismatch, dataset: Sequence[Dataset], depends: str | None) -> tuple[Place, ...]:
+def locations(mismatch: Mismatch, dataset: Sequence[Dataset], depends: str | None) -> tuple[Location, ...]:
     """Where the misfit is more than noise, largest share first."""
     return tuple(
-        Place(
+        Location(
             recording=dataset[c.recording].name,
             channel=c.channel,
             phase=c.phase,

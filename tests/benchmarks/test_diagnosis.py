@@ -25,7 +25,7 @@ from rollover.diagnosis import Diagnosis, diagnose
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference.weak_form import Balance, balances
@@ -138,7 +138,7 @@ def test_a_diagnosis_beside_pysindy_and_a_polynomial(kind: str, effect: str) -> 
     forces = balances([set_up(scenario, e.recording) for e in kept], kept)
     assert len(forces) > 2  # a way down that is too short for windows has none
     problem = Problem(kept)
-    align(problem)
+    estimate_time_shifts(problem)
     gain, says = told(found)
     rows = [("diagnose", gain, np.nan, says, 1.0)]
     for name, method in (("pysindy", by_sindy), ("polynomial", by_squares)):

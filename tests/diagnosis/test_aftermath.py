@@ -210,7 +210,7 @@ def test_screening_and_first_fits_are_truncated_final_fits_not(monkeypatch: pyte
         return ScoreTest(score=0.0, scores={}, null=np.zeros(10), detectable={})
 
     monkeypatch.setattr(scan, "score_test", gated)
-    looked = scan.look(problem, base, [], [[0], [1]])
+    scored = scan.score_candidates(problem, base, [], [[0], [1]])
 
     def screened(inquiry: Inquiry, base: Fitted, *_: object) -> list[Any]:
         asked.append(("screen", inquiry.problem, base.blocks[0].residual.size))
@@ -230,7 +230,7 @@ def test_screening_and_first_fits_are_truncated_final_fits_not(monkeypatch: pyte
     inquiry = Inquiry(
         problem=problem, candidates=(), groups=[[0], [1]], phases=[], say=lambda _: None, executor=Executor()
     )
-    assert forward_step.step(inquiry, base, looked) is None
+    assert forward_step.step(inquiry, base, scored) is None
     rows = near.dataset[0].count
     assert asked[-3:] == [("screen", near, rows), ("first", near, rows), ("fits", problem, 1)]
     assert {(name, id(who), n) for name, who, n in asked[:-3]} == {("look", id(near), rows)}

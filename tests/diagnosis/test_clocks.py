@@ -11,7 +11,7 @@ from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.local_search import ended
 from rollover.diagnosis.fit.parameterisation import coordinate, followed
-from rollover.diagnosis.fit.time_shift import align, clock_evidence, clock_outliers, shifts_from_contact
+from rollover.diagnosis.fit.time_shift import clock_evidence, clock_outliers, estimate_time_shifts, shifts_from_contact
 from rollover.diagnosis.forward.forward_model import DropSimulator, simulator_of
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.score_test import score_test
@@ -63,7 +63,7 @@ def known(problem: Problem, changes: dict[str, object]) -> np.ndarray:
 def test_the_onset_is_not_biased_by_missing_physics(missing: dict[str, object]) -> None:
     problem = judge_of(missing, late=0.5e-3)
     truth = known(problem, missing)
-    align(problem)
+    estimate_time_shifts(problem)
     base = problem.fit((), ())
     assert base is not None
     bent = np.array([b.shift for b in base.blocks]) - truth
@@ -77,7 +77,7 @@ def test_the_onset_of_contact_is_found_whatever_happens_then(late: float) -> Non
     """A striker that gives way rings from the first instant, and its recorder's clock has no zero."""
     ringing = {"effects.structural-compliance.stiffness": 1.9e6, "effects.structural-compliance.damping": 1400.0}
     problem = without_zero(judge_of(ringing, late=late))
-    align(problem)
+    estimate_time_shifts(problem)
     base = problem.fit((), ())
     assert base is not None
     bent = np.array([b.shift for b in base.blocks]) - late
@@ -146,7 +146,7 @@ def test_fits_from_two_places_end_at_one() -> None:
     """A soil a thousandth softer than its law: followed to its end, from wherever it began, a fit leaves the same."""
     problem = judge_of({"effects.soil-stiffness.scale": 0.9987}, noise=0.0005)
     candidate = {c.id: c for c in candidates_of(problem.dataset, (), "drop")}["soil-stiffness"]
-    align(problem)
+    estimate_time_shifts(problem)
     ends = [problem.fit((candidate,), (start,)) for start in (0.40, 0.5, 0.62)]
     left = [ended(problem, f).left for f in ends if f is not None]
     assert len(left) == 3
@@ -169,14 +169,14 @@ def test_a_path_from_the_null_value_is_followed_linearly() -> None:
     problem = judge_of({})
     by_id = {c.key: c for c in candidates_of(problem.dataset, (), "drop")}
     layer = by_id["soil-layer"]
-    x = layer.probes()[0]
+    x = layer.scan_points()[0]
     there = followed(layer, x, 30.0)
     assert there is not None
     before, after = layer.values(x), layer.values(there)
     assert after["stiffness_ratio"] - 1.0 == pytest.approx(30.0 * (before["stiffness_ratio"] - 1.0))
     assert after["depth"] == before["depth"]
     clip = by_id[f"sensor-clipping:{FORCE}"]
-    assert followed(clip, clip.probes()[0], 3.0) is None
+    assert followed(clip, clip.scan_points()[0], 3.0) is None
 
 
 def one_late(problem: Problem, late: float) -> Problem:

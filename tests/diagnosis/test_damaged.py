@@ -122,8 +122,10 @@ def test_recordings_that_contradict_each_other_are_not_explained() -> None:
         ({"rops-plasticity": 1.0, "mass": 1.0}, True),  # of a limit, and of a value, nothing is usual
     ],
 )
-def test_recordings_that_show_no_usual_strength_are_too_weak(detectable: dict[str, float], is_weak: bool) -> None:
-    assert power.is_weak(detectable) is is_weak
+def test_recordings_that_show_no_usual_strength_are_too_weak(
+    detectable: dict[str, float], is_underpowered: bool
+) -> None:
+    assert power.is_underpowered(detectable) is is_underpowered
 
 
 def test_millimetres_stated_as_metres_are_a_channels_scale() -> None:

@@ -13,7 +13,7 @@ from ground.law import REFERENCE_AREA
 from rollover.diagnosis import diagnose, diagnosed_text, json_of
 from rollover.diagnosis.data.dataset import dataset_of, left_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.forward_model import set_up, simulator_of
 from rollover.diagnosis.inference.residual_law import best_subsets, proposed
 from rollover.diagnosis.inference.weak_form import Balance, _tests, balances
@@ -200,7 +200,7 @@ def test_no_law_is_made_of_noise() -> None:
     made = recorded({}, 7, speeds=(1.5, 2.0, 2.5, 3.0), channels=(FORCE, DEPTH, ACCELERATION), rate=1000.0)
     found = [e for e in (dataset_of(n, r, simulator_of(scenario(), r)) for n, r in made) if e is not None]
     problem = Problem(found)
-    align(problem)
+    estimate_time_shifts(problem)
     base = problem.fit((), ())
     assert base is not None
     sets = [set_up(scenario(), e.recording) for e in found]

@@ -150,7 +150,9 @@ def test_what_was_bent_to_do_anothers_work_is_straight_beside_it(leaves: float, 
 
     best = made((wide, other), (0.25, 0.6, 0.5, 0.7))
     found = replace(step(best), rivals=(best,))
-    after = simplification._in_usual_shapes(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, rate])), found)
+    after = simplification._with_usual_secondary(
+        cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, rate])), found
+    )
     assert begun == [(0.25, 0.5), (0.25, 0.5, 0.7), (0.25, 0.6, 0.5)]
     assert (after is None) == (not straight)
     if after is not None:
@@ -172,7 +174,7 @@ def test_what_draws_any_curve_is_not_followed_but_straightened(
         monkeypatch.setattr(simplification, name, lambda _, f: f)
     monkeypatch.setattr(simplification, "simpler", lambda *_: None)
     straight = step(fitted("soil-stiffness", 4.0, (0.7, 0.3)))
-    monkeypatch.setattr(simplification, "_in_usual_shapes", lambda *_: straight)
+    monkeypatch.setattr(simplification, "_with_usual_secondary", lambda *_: straight)
     found, _ = simplification.followed(
         cast(Inquiry, SimpleNamespace(problem=problem, phases=[], candidates=[])), step(best)
     )

@@ -284,8 +284,8 @@ def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> 
     rate = candidate(problem, "soil-rate-hardening")
     begun = problem.fit((rate,), (0.5,))
     assert begun is not None
-    shifts, form = tuple(b.shift for b in begun.blocks), rate.forms()[0]
-    task = Task(how="shape", candidates=(rate,), start=begun.x, shifts=shifts, form=form)
+    shifts, variant = tuple(b.shift for b in begun.blocks), rate.variants()[0]
+    task = Task(how="shape", candidates=(rate,), start=begun.x, shifts=shifts, variant=variant)
     found = []
     for _ in range(2):
         with Executor(notebook=tmp_path / "notes") as one:
@@ -295,7 +295,7 @@ def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> 
     first, again = found
     assert first is not None
     assert again is not None
-    assert first.candidates[-1].form["per_decade"] == 0.0
+    assert first.candidates[-1].variant["per_decade"] == 0.0
     assert again.candidates[-1] == first.candidates[-1]
     assert again.x == pytest.approx(first.x, rel=1e-12)
     assert made < 20

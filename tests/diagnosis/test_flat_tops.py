@@ -76,4 +76,4 @@ def test_a_limit_is_looked_for_where_values_end_too() -> None:
     made, end = cut(0.8)
     found = with_quantisation([dataset_of(n, *simulated(scenario(), r)) for n, r in made], [r for _, r in made])
     limit = next(c for c in candidates_of(found, (), "drop") if c.key == f"sensor-clipping:{FORCE}")
-    assert any(limit.values(x)["limit"] == pytest.approx(end) for x in limit.probes())
+    assert any(limit.values(x)["limit"] == pytest.approx(end) for x in limit.scan_points())

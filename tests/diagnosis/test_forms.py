@@ -105,7 +105,7 @@ def test_far_from_noise_a_variant_that_soon_gains_is_followed(left: float, soon:
 
 def test_misled_variants_restart_from_the_usual_one_on_all() -> None:
     """From other places short fits to three recordings leave least, and whole ones from there far more than before."""
-    usual = replace(DAMPING, shapes={"exponent": Search(0, 1)})
+    usual = replace(DAMPING, secondary={"exponent": Search(0, 1)})
     start, stands = fitted(usual, (0.3,), 30.0), usual.with_secondary((0.3,))[0]
     least = [60.0]
 

@@ -37,9 +37,9 @@ def test_an_unfitted_exponent_widens_the_strengths_interval() -> None:
     changes = {"effects.soil-viscous-damping.damping": 60.0, "effects.soil-viscous-damping.exponent": 0.9}
     problem = judge_of(recorded(changes, speeds=(1.0, 1.5, 2.0), noise=0.01))
     c = candidate(problem, "soil-viscous-damping")
-    assert set(c.shapes) == {"exponent"}
+    assert set(c.secondary) == {"exponent"}
     fitted = fit(problem, c)
-    no_jacobian = replace(fitted, candidates=(replace(c, shapes={}),))
+    no_jacobian = replace(fitted, candidates=(replace(c, secondary={}),))
     wide, narrow = (stated.intervals(problem, f)[0]["damping"] for f in (fitted, no_jacobian))
     assert wide.low <= 60.0 <= wide.high
     assert wide.high - wide.low > 1.5 * (narrow.high - narrow.low)
@@ -70,9 +70,9 @@ def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float) -> N
     fitted = Fitted(candidates=(candidate,), x=(0.5,), blocks=(block(0, None, [0.5], 0.0, 0.0),))
     found = stated.profile_extents(problem, fitted, np.array([1.0 / J]), 1.0)
     assert found == pytest.approx(np.full((1, 2), flatter), rel=1e-12)  # rounding: the misfit is a parabola
-    for sides, looked in (({0: (1.0,)}, (0.0, 1.0)), ({0: (-1.0,)}, (1.0, 0.0)), ({}, (0.0, 0.0))):
+    for sides, scored in (({0: (1.0,)}, (0.0, 1.0)), ({0: (-1.0,)}, (1.0, 0.0)), ({}, (0.0, 0.0))):
         found = stated.profile_extents(problem, fitted, np.array([1.0 / J]), 1.0, sides)
-        assert found == pytest.approx(1.0 + (flatter - 1.0) * np.array([looked]), rel=1e-12)
+        assert found == pytest.approx(1.0 + (flatter - 1.0) * np.array([scored]), rel=1e-12)
 
 
 @pytest.mark.parametrize(("start", "places"), [(0.5, 8), (0.08, 7)])

@@ -33,7 +33,7 @@ def test_pair_gain_and_step_are_those_of_least_squares() -> None:
         told[i, j] = misfit @ misfit - left[0], way
     assert [b.gain for b in found] == sorted((b.gain for b in found), reverse=True)
     for both in found:
-        gain, way = told[both.places]
+        gain, way = told[both.columns]
         assert both.gain == pytest.approx(gain, rel=1e-9)
         assert both.along == pytest.approx(tuple(way), rel=1e-9)
 
@@ -46,7 +46,7 @@ def test_two_that_gain_nothing_alone_may_gain_all_together() -> None:
     misfit = 30.0 * (np.cos(0.1) * across - np.sin(0.1) * first)  # at right angles to their mean
     D = np.stack([first, second, other], axis=1)
     best, *_ = best_direction_pairs(D.T @ misfit, D.T @ D, ["layer", "crust", "mass"])
-    assert best.places == (0, 1)
+    assert best.columns == (0, 1)
     assert best.gain == pytest.approx(900.0, rel=1e-9)
     assert np.max((D.T @ misfit) ** 2) < 0.011 * 900.0
 
@@ -65,7 +65,7 @@ def test_pairs_take_the_best_directions_of_two_effects() -> None:
     owners = [f"{k // 2}" for k in range(40)]  # two directions each: 190 pairs of owners
     found = best_direction_pairs(D.T @ rng.standard_normal(200), D.T @ D, owners)
     assert len(found) == SETTINGS.selection.pair_score.most_pairs
-    told = [frozenset(owners[k] for k in b.places) for b in found]
+    told = [frozenset(owners[k] for k in b.columns) for b in found]
     assert len(set(told)) == SETTINGS.selection.pair_score.most_pairs
     assert all(len(p) == 2 for p in told)
 
@@ -79,9 +79,9 @@ def test_a_gate_leads_to_two_that_hide_each_other() -> None:
     kinds = [candidate(problem, key) for key in ("guide-friction", "soil-added-mass-growth", "mass", "soil-stiffness")]
     base = problem.fit((), ())
     assert base is not None
-    looked = score_test(problem, base, kinds)
-    assert looked.scores["soil-added-mass-growth"] < 0.5 * looked.score
-    (one, x), (other, y) = looked.both[0]
+    scored = score_test(problem, base, kinds)
+    assert scored.scores["soil-added-mass-growth"] < 0.5 * scored.score
+    (one, x), (other, y) = scored.both[0]
     assert {one, other} == {"guide-friction", "soil-added-mass-growth"}
     begun = {one: x, other: y}
     for c in kinds[:2]:
@@ -100,7 +100,7 @@ def test_near_noise_slopes_suggest_pairs_but_no_any_curve(monkeypatch: pytest.Mo
         screened=tuple(screened(c) for c in (DAMPING, NOSE)),
     )  # fmt: skip
     both = ((("soil-viscous-damping", (0.7,)), ("mass", (0.2,))),)
-    looked = ScoreTest(
+    scored = ScoreTest(
         score=9.0, scores={"mass": 9.0, "soil-viscous-damping": 1.0}, null=np.zeros(9), detectable={}, both=both
     )
     asking = inquiry(asked)
@@ -111,7 +111,7 @@ def test_near_noise_slopes_suggest_pairs_but_no_any_curve(monkeypatch: pytest.Mo
     for far in (False, True):
         asked.clear()
         monkeypatch.setattr(pairs, "is_far", lambda *_, far=far: far)
-        assert pairs.best_pair(asking, [first], looked) is None
+        assert pairs.best_pair(asking, [first], scored) is None
         tried = [(tuple(c.id for c in task.candidates), task.start) for task in asked if task.rounds == 2]
         names = {frozenset(ids) for ids, _ in tried}
         assert frozenset(("soil-layer", "soil-crust")) not in names

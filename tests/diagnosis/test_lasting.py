@@ -180,13 +180,13 @@ def test_with_what_leads_its_kin_gets_a_first_fit() -> None:
     every = [Candidate(id=i, kind="physics", family=f, search=two, null=(None, 0.5)) for i, f in kinds]
     every += [Candidate(id=i, kind="sensor", family="depth", search={}) for i in ("g", "h", "i")]
     screened = [Screened(candidate=c, starts=(), left=float(k), potential=0.0) for k, c in enumerate(every)]
-    looked = ScoreTest(score=9.0, scores={c.key: 9.0 - k for k, c in enumerate(every)}, null=np.zeros(9), detectable={})
-    chosen = {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, looked)}
+    scored = ScoreTest(score=9.0, scores={c.key: 9.0 - k for k, c in enumerate(every)}, null=np.zeros(9), detectable={})
+    chosen = {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, scored)}
     assert chosen == {"a", "b", "c", "d", "f", "g", "h", "i"}
-    hopeless = replace(looked, scores={**looked.scores, "c": 0.4, "f": 0.4})  # of 9; one is akin to the best
+    hopeless = replace(scored, scores={**scored.scores, "c": 0.4, "f": 0.4})  # of 9; one is akin to the best
     assert "c" not in (rest := {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, hopeless)})
     assert {"a", "b", "f"} < rest
-    loud = replace(looked, scores={**looked.scores, "g": 500.0})  # a sensor: those that move the vehicle stay
+    loud = replace(scored, scores={**scored.scores, "g": 500.0})  # a sensor: those that move the vehicle stay
     assert {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, loud)} == {"a", "b", "c", "d", "f", "g"}
     masked = replace(hopeless, leading=("c",))
     assert "c" in {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, masked)}
@@ -205,9 +205,9 @@ def test_what_admits_a_step_speaks_for_its_best(monkeypatch: pytest.MonkeyPatch,
     null = np.sort(np.random.default_rng(0).standard_normal((4000, 10)).max(axis=1) ** 2)
     score = float(np.quantile(null, 1.0 - (0.06 if p > 0.005 or not kept else p)))
     one = Fitted(candidates=(candidate("slope", "physics", "a"),), x=(0.5,), blocks=())
-    looked = ScoreTest(score=score, scores={"slope": score}, null=null, detectable={})
+    scored = ScoreTest(score=score, scores={"slope": score}, null=null, detectable={})
     inquiry: Any = SimpleNamespace(problem=SimpleNamespace(effort=SETTINGS.forward.runs), groups=[])
-    stepwise.validated_step(inquiry, Step(base=one, fitted=one, p_value=p, rivals=(one,)), looked)
+    stepwise.validated_step(inquiry, Step(base=one, fitted=one, p_value=p, rivals=(one,)), scored)
     assert seen == [kept]
 
 
@@ -216,16 +216,16 @@ def test_a_rival_that_nothing_spoke_for_is_none() -> None:
         Fitted(candidates=(candidate(k, "physics", "a"),), x=(0.5,), blocks=()) for k in ("slope", "mass", "inertia")
     ]
     null = np.sort(np.random.default_rng(0).standard_normal((4000, 20)).max(axis=1) ** 2)
-    looked = ScoreTest(score=60.0, scores={"slope": 60.0, "mass": 4.0}, null=null, detectable={})
+    scored = ScoreTest(score=60.0, scores={"slope": 60.0, "mass": 4.0}, null=null, detectable={})
     step = Step(base=fits[0], fitted=fits[1], p_value=0.0, rivals=tuple(fits))
-    assert without_unsupported_rivals(step, looked).rivals == (fits[0],)
-    far = replace(looked, far={"inertia": ((0.9,),)})  # its runs did
+    assert without_unsupported_rivals(step, scored).rivals == (fits[0],)
+    far = replace(scored, far={"inertia": ((0.9,),)})  # its runs did
     assert without_unsupported_rivals(step, far).rivals == (fits[0], fits[2])
     two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
     placed = [Candidate(id=i, kind="physics", family="f", search=two, null=(None, 0.5)) for i in ("slope", "mass")]
     same_family = [Fitted(candidates=(c,), x=(0.5, 0.5), blocks=()) for c in placed]
     others = replace(step, rivals=(*same_family, fits[2]))
-    assert without_unsupported_rivals(others, looked).rivals == tuple(same_family)
+    assert without_unsupported_rivals(others, scored).rivals == tuple(same_family)
 
 
 def test_what_shows_before_the_blow_alone_lasts() -> None:
@@ -364,14 +364,14 @@ def test_other_courses_are_counted_otherwise_where_nothing_lasts(
     )
     seen: list[bool] = []
     problem: Any = SimpleNamespace(heavy_tailed=heavy_tailed, again=lambda f: f, effort=SETTINGS.forward.runs)
-    looked = ScoreTest(score=0.0, scores={}, null=np.zeros(9), detectable={})
+    scored = ScoreTest(score=0.0, scores={}, null=np.zeros(9), detectable={})
     made = Step(base=current, fitted=current, p_value=0.0)
 
     def parallel_map(problem: Any, *_: Any) -> ScoreTest:
         seen.append(problem.heavy_tailed)
-        return looked
+        return scored
 
-    monkeypatch.setattr(stepwise, "look", parallel_map)
+    monkeypatch.setattr(stepwise, "score_candidates", parallel_map)
     monkeypatch.setattr(stepwise, "step", lambda *_: made)
     monkeypatch.setattr(stepwise, "ensemble_validated", lambda *_: made if lasts else None)
     monkeypatch.setattr(stepwise, "largest_change", lambda *_: 1.0)

@@ -16,7 +16,7 @@ from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import without_effect
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.selection.forward_step import reusable_slopes
-from rollover.diagnosis.selection.scan import look
+from rollover.diagnosis.selection.scan import score_candidates
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.test_looks import judge_of as looks_of
 from tests.diagnosis.test_slopes import CHANNEL, MASS, SIGMA, SLOPE, TIME, Late, dataset
@@ -226,5 +226,5 @@ def test_a_robust_screening_shares_the_jacobian_of_a_plain(
     recounted, asked = Problem.recounted, list[bool]()
     monkeypatch.setattr(Problem, "again", lambda *_: pytest.fail("slopes cost runs"))
     monkeypatch.setattr(Problem, "recounted", lambda own, f: (asked.append(own.heavy_tailed), recounted(own, f))[1])
-    look(problem, base, [SLOPE], [[r] for r in range(4)])
+    score_candidates(problem, base, [SLOPE], [[r] for r in range(4)])
     assert asked == [True]

@@ -15,8 +15,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.noise.ensemble import HeavyTail
-from rollover.diagnosis.selection import decision
-from rollover.diagnosis.selection import scan as parallel_map
+from rollover.diagnosis.selection import decision, scan
 from rollover.diagnosis.selection.score_test import ScoreTest, _best_amplitude, _birge_ratio, _visible, score_test
 from rollover.diagnosis.selection.screening import _begun_at, promising
 from rollover.diagnosis.settings import SETTINGS
@@ -127,19 +126,19 @@ def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.Monk
         SETTINGS.forward.runs.looked_at: {"c3": ((0.4,),), "c4": ((0.6,),)},
     }
 
-    def looked(_: Problem, base: Fitted, candidates: Any, only: Any, beside: Any) -> ScoreTest:
+    def scored(_: Problem, base: Fitted, candidates: Any, only: Any, beside: Any) -> ScoreTest:
         asked.append((len(only), [c.key for c in candidates]))
-        at.update({c.key: c.places for c in candidates})
+        at.update({c.key: c.points for c in candidates})
         scores = {c.key: 90.0 - int(c.key[1:]) for c in candidates}
         return ScoreTest(
             score=max(scores.values()), scores=scores, null=np.full(10, float(len(only))), detectable=scores,
-            places={"c2": ((0.7,), (0.1,))}, starts=begun[len(only)],
+            points={"c2": ((0.7,), (0.1,))}, starts=begun[len(only)],
         )  # fmt: skip
 
-    monkeypatch.setattr(parallel_map, "score_test", looked)
+    monkeypatch.setattr(scan, "score_test", scored)
     problem, base = judge_of((0.0,) * 5, (0.0,) * 5)
     every = [replace(SLOPE, id=f"c{k}") for k in range(30)] + [replace(SLOPE, id="c77", kind="sensor")]
-    found = parallel_map.look(problem, base, every, [[r] for r in range(5)])
+    found = scan.score_candidates(problem, base, every, [[r] for r in range(5)])
     assert [n for n, _ in asked] == [SETTINGS.forward.runs.few, SETTINGS.forward.runs.looked_at]
     assert len(asked[0][1]) == 31
     assert asked[1][1] == [f"c{k}" for k in range(SETTINGS.forward.runs.shortlist)] + ["c77"]
@@ -164,10 +163,10 @@ def test_a_look_says_where_an_effect_told_most() -> None:
     simulator: Any = Turned(0.0)
     problem = Problem([replace(e, simulator=simulator) for e in problem.dataset])
     block = replace(base.blocks[0], residual=50.0 * np.sin(30.0 * TIME + 6.0 * 0.145))
-    turned = replace(SLOPE, search={"angle": Search(0.0, 1.0)}, places=every)
+    turned = replace(SLOPE, search={"angle": Search(0.0, 1.0)}, points=every)
     found = score_test(problem, replace(base, blocks=(block, block)), [turned])
     nearest = sorted(every, key=lambda x: abs(x[0] - 0.145))
-    assert found.places[turned.key] == tuple(nearest[: SETTINGS.selection.score_test.close_places])
+    assert found.points[turned.key] == tuple(nearest[: SETTINGS.selection.score_test.close_points])
 
 
 def test_the_best_two_scan_points_of_an_effect_start_fits() -> None:
@@ -182,14 +181,14 @@ def test_a_leader_on_few_recordings_is_tried_on_all(
 ) -> None:
     """40 by two recordings, 5 by four: where each may take another course four tell more than two, else the better."""
 
-    def looked(_: Problem, base: Fitted, candidates: Any, only: Any, beside: Any) -> ScoreTest:
+    def scored(_: Problem, base: Fitted, candidates: Any, only: Any, beside: Any) -> ScoreTest:
         scores = {c.key: 40.0 if len(only) == SETTINGS.forward.runs.few else 5.0 for c in candidates}
         return ScoreTest(score=max(scores.values()), scores=scores, null=np.ones(10), detectable={})
 
-    monkeypatch.setattr(parallel_map, "score_test", looked)
+    monkeypatch.setattr(scan, "score_test", scored)
     problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
     problem.heavy_tailed = heavy_tailed
-    found = parallel_map.look(problem, base, [SLOPE], [[r] for r in range(4)])
+    found = scan.score_candidates(problem, base, [SLOPE], [[r] for r in range(4)])
     assert found.scores["slope"] == kept
     assert found.score == 5.0  # what is claimed is claimed by all
 
@@ -198,7 +197,7 @@ def test_the_leader_of_the_robust_screening_is_tried_first(monkeypatch: pytest.M
     """In full c0 to c9 score best in turn, forgiven c5 and then c7, and c8 by chance: these take turns."""
     asked: list[tuple[bool, set[str]]] = []
 
-    def looked(problem: Problem, base: Fitted, candidates: Any, only: Any, beside: Any) -> ScoreTest:
+    def scored(problem: Problem, base: Fitted, candidates: Any, only: Any, beside: Any) -> ScoreTest:
         asked.append((problem.heavy_tailed, {c.key for c in candidates}))
         scores = {c.key: 90.0 - int(c.key[1:]) for c in candidates}
         if problem.heavy_tailed:
@@ -206,12 +205,12 @@ def test_the_leader_of_the_robust_screening_is_tried_first(monkeypatch: pytest.M
         null = np.sort(np.random.default_rng(0).chisquare(1, 1000))
         return ScoreTest(score=max(scores.values()), scores=scores, null=null, detectable={})
 
-    monkeypatch.setattr(parallel_map, "score_test", looked)
-    monkeypatch.setattr(parallel_map, "strong_starts", lambda *_: {})
+    monkeypatch.setattr(scan, "score_test", scored)
+    monkeypatch.setattr(scan, "strong_starts", lambda *_: {})
     problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
     problem.heavy_tailed, problem.effort = False, replace(problem.effort, leaders=3)
     every = [replace(SLOPE, id=f"c{k}", kind="sensor" if k == 9 else "parameter") for k in range(10)]
-    found = parallel_map.look(problem, base, every, [[r] for r in range(4)])
+    found = scan.score_candidates(problem, base, every, [[r] for r in range(4)])
     assert not problem.heavy_tailed
     assert found.leading == ("c7", "c5")
     assert [c.key for c in found.ranked(every)][:5] == ["c7", "c5", "c0", "c1", "c2"]  # c7 is first of both
@@ -222,7 +221,7 @@ def test_the_leader_of_the_robust_screening_is_tried_first(monkeypatch: pytest.M
     assert all("c9" not in keys for heavy_tailed, keys in asked if heavy_tailed)
     problem.heavy_tailed = True
     asked.clear()
-    assert parallel_map.look(problem, base, every, [[r] for r in range(4)]).leading == ()
+    assert scan.score_candidates(problem, base, every, [[r] for r in range(4)]).leading == ()
     assert len(asked) == 2
 
 
@@ -262,7 +261,7 @@ def test_no_screening_beside_a_model_without_usable_runs(
 ) -> None:
     asked: list[tuple[Any, Any]] = []
 
-    def looked(
+    def scored(
         _: Problem,
         base: Fitted,
         candidates: Any,
@@ -275,26 +274,26 @@ def test_no_screening_beside_a_model_without_usable_runs(
         null = np.sort(np.random.default_rng(0).chisquare(1, 1000))
         return ScoreTest(score=float(np.quantile(null, 1.0 - hint)), scores={}, null=null, detectable={})
 
-    monkeypatch.setattr(parallel_map, "look", looked)
+    monkeypatch.setattr(scan, "score_candidates", scored)
     problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
     problem.effort = replace(problem.effort, is_ensemble=is_ensemble)
     first = ScoreTest(score=0.0, scores={}, null=np.zeros(10), detectable={}, only=(0, 2))
-    parallel_map.rescored(problem, base, base, [SLOPE], [[r] for r in range(4)], first)
+    scan.rescored(problem, base, base, [SLOPE], [[r] for r in range(4)], first)
     assert len(asked) == looks_made
     assert asked[0] == ((base, (0, 2)) if is_ensemble else (None, ()))
     if looks_made == 2:
         assert asked[1] == (None, ())
     asked.clear()
-    parallel_map.rescored(problem, base, None, [SLOPE], [[r] for r in range(4)], first)  # where the rest is structured
+    scan.rescored(problem, base, None, [SLOPE], [[r] for r in range(4)], first)  # where the rest is structured
     assert asked == [(None, ())]
 
 
 def test_what_was_refuted_tells_nothing() -> None:
     problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
-    looked = score_test(problem, base, [SLOPE])
+    scored = score_test(problem, base, [SLOPE])
     before: Any = type("M", (), {"p_value": 0.3})()
     found = decision.Explanation(
-        base=base, fitted=base, parts=(), looked=looked, detectable={}, before=before, after=before
+        base=base, fitted=base, parts=(), scored=scored, detectable={}, before=before, after=before
     )
     assert found.p_value < 1e-6
     assert replace(found, refuted=True).p_value == 0.3
@@ -316,7 +315,7 @@ def test_the_smaller_of_two_split_p_values_is_uniform(
         one: Any = SimpleNamespace(p_value=before)
         other: Any = SimpleNamespace(p_value=lambda: look)
         found = decision.Explanation(
-            base=base, fitted=base, parts=(), looked=other, detectable={}, before=one, after=one
+            base=base, fitted=base, parts=(), scored=other, detectable={}, before=one, after=one
         )
         return found.p_value
 

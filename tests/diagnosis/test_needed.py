@@ -48,11 +48,11 @@ def test_the_last_effect_is_searched_anew_beside_variants(
 
     What takes the place of the crust stands beside another: the layer is looked for once more, now beside that.
     """
-    looked: list[str] = []
+    scored: list[str] = []
 
     def swapped(_: Any, current: Fitted) -> Step:
         first, *rest = current.candidates
-        looked.append(first.id)
+        scored.append(first.id)
         kept = [(c.id, tuple(c.search)) for c in rest]
         found = of(*kept, answers[first.id])
         return Step(base=of(*kept), fitted=found, p_value=0.0, rivals=(found,))
@@ -64,9 +64,9 @@ def test_the_last_effect_is_searched_anew_beside_variants(
         Step(base=of(), fitted=of(beside), p_value=0.0),
         Step(base=of(beside), fitted=of(held, CRUST), p_value=0.0),
     ]
-    parts = decision._needed_steps(cast(Inquiry, SimpleNamespace(problem=problem)), taken)
+    parts = decision._retained_steps(cast(Inquiry, SimpleNamespace(problem=problem)), taken)
     assert parts is not None
-    assert looked == asked
+    assert scored == asked
     assert {c.id for c in parts[-1].fitted.candidates} == {"soil-layer", answers.get("soil-crust", CRUST)[0]}
     assert len(parts) == 2
 
@@ -153,17 +153,17 @@ MASS, SPEED, RATE, DRAG = ((i, ("a",)) for i in ("mass", "impact-speed", "soil-r
 def test_a_full_set_swapped_again_and_again_is_no_answer(
     monkeypatch: pytest.MonkeyPatch, answers: list[Any], needless: str, asked: list[str], found: set[str] | None
 ) -> None:
-    looked: list[str] = []
+    scored: list[str] = []
 
     def swapped(_: Any, current: Fitted) -> Step:
         first, *rest = current.candidates
         kept = [(c.id, tuple(c.search)) for c in rest]
-        new = of(*kept, answers[len(looked)])
-        looked.append(first.id)
+        new = of(*kept, answers[len(scored)])
+        scored.append(first.id)
         return Step(base=of(*kept), fitted=new, p_value=0.0, rivals=(new,))
 
     def backward_elimination(_: Any, f: Fitted, *__: Any) -> Fitted:
-        left = [(c.id, tuple(c.search)) for c in f.candidates if len(looked) < 2 or c.id != needless]
+        left = [(c.id, tuple(c.search)) for c in f.candidates if len(scored) < 2 or c.id != needless]
         return of(*left)
 
     monkeypatch.setattr(decision, "with_first_replaced", swapped)
@@ -174,8 +174,8 @@ def test_a_full_set_swapped_again_and_again_is_no_answer(
         Step(base=of(*order[:k]), fitted=of(*order[: k + 1]), p_value=0.0)
         for k in range(SETTINGS.selection.flexibility.most_effects)
     ]
-    parts = decision._needed_steps(cast(Inquiry, SimpleNamespace(problem=problem)), taken)
-    assert looked == asked
+    parts = decision._retained_steps(cast(Inquiry, SimpleNamespace(problem=problem)), taken)
+    assert scored == asked
     assert (None if parts is None else {c.id for c in parts[-1].fitted.candidates}) == found
 
 
@@ -214,10 +214,10 @@ def test_a_set_that_was_swapped_has_a_step_for_each_member(
     monkeypatch: pytest.MonkeyPatch, back: Any, rivals: list[str]
 ) -> None:
     """A crust with a layer on it is followed to a layer on another stiffness: none of the steps was the layer's."""
-    looked: list[str] = []
+    scored: list[str] = []
 
     def swapped(_: Any, current: Fitted) -> Step | None:
-        looked.append(current.candidates[0].id)
+        scored.append(current.candidates[0].id)
         found = None if back is None else of(STIFFNESS, back)
         return None if found is None else Step(base=of(STIFFNESS), fitted=found, p_value=0.0, rivals=(found,))
 
@@ -228,7 +228,7 @@ def test_a_set_that_was_swapped_has_a_step_for_each_member(
     ]
     ended = Step(base=of(LAYER), fitted=both, p_value=0.0, rivals=(both,))
     monkeypatch.setattr(decision, "with_first_replaced", swapped)
-    monkeypatch.setattr(decision, "_needed_steps", lambda *_: retained)
+    monkeypatch.setattr(decision, "_retained_steps", lambda *_: retained)
     monkeypatch.setattr(decision, "followed", lambda *_: (ended, None))
     problem = SimpleNamespace(again=lambda f: f, effort=SETTINGS.forward.drops)
     parts = decision._fully_fitted_steps(cast(Inquiry, SimpleNamespace(problem=problem)), retained)
@@ -237,7 +237,7 @@ def test_a_set_that_was_swapped_has_a_step_for_each_member(
     assert parts[-1].fitted is both
     assert {c.id for c in parts[0].fitted.candidates} == {"soil-layer", "soil-stiffness"}
     assert [f.candidates[-1].id for f in parts[0].rivals] == rivals
-    assert looked == ["soil-layer"]
+    assert scored == ["soil-layer"]
 
 
 def test_a_sure_effect_lies_ten_intervals_from_its_null(monkeypatch: pytest.MonkeyPatch) -> None:

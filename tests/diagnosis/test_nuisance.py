@@ -15,7 +15,7 @@ from rollover.diagnosis.data.dataset import Dataset, condition_groups, dataset_o
 from rollover.diagnosis.data.repeatability import with_scatter
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import coordinate
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.forward_model import set_up, simulator_of
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from rollover.diagnosis.statements import mean_pulls, pull_notes
@@ -63,7 +63,7 @@ def test_uncertain_speeds_explain_what_they_can_and_no_more() -> None:
     for sigma in (0.0, 0.06):
         found = dataset(wrong_conditions({}, sigma))
         problem = Problem(found)
-        align(problem)
+        estimate_time_shifts(problem)
         base = problem.fit((), ())
         assert base is not None
         left[sigma] = np.sqrt(base.left / sum(e.count for e in found))
@@ -202,7 +202,7 @@ def test_what_takes_up_the_mismatch_is_said_with_its_pull(off: float, note: str)
         for name, r in recorded({"vehicle.mass": off * mass}, 1, speeds=SPEEDS)
     ]
     problem = Problem(dataset(found))
-    align(problem)
+    estimate_time_shifts(problem)
     base = problem.fit((), ())
     assert base is not None
     # 1.85 and 0.0 were seen: two sigma off differs from one sigma and from three by five times this
@@ -227,7 +227,7 @@ def test_shapes_are_looked_for_where_they_have_a_part() -> None:
         e = dataset_of("one", r, simulator_of(shipped(name), r))
         assert e is not None
         (one,) = [c for c in candidates_of([e], (), "drop", shipped(name)) if c.id == effect]
-        return {n: (s.low, s.high) for n, s in one.shapes.items()}
+        return {n: (s.low, s.high) for n, s in one.secondary.items()}
 
     def one(name: str, times: np.ndarray, channel: str, **known: float) -> Recording:
         y = DropModel(scenario=shipped(name).replaced(known)).run(times)[channel]

@@ -16,7 +16,7 @@ from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry
 from rollover.diagnosis.fit.tasks import Task
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.forward_step import _restarted_from_base
@@ -28,7 +28,7 @@ from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks, recorded, scenario
 
 PLAIN = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
-SHAPED = replace(PLAIN, id="soil-adhesion", search={"stress": Search(1, 2)}, shapes={"reach": Search(1, 2)})
+SHAPED = replace(PLAIN, id="soil-adhesion", search={"stress": Search(1, 2)}, secondary={"reach": Search(1, 2)})
 
 
 def begun(promised: float, gained: float) -> list[str]:
@@ -53,12 +53,12 @@ def begun(promised: float, gained: float) -> list[str]:
         return [None] * len(tasks)
 
     inquiry = SimpleNamespace(free=lambda _: [PLAIN, SHAPED], fits=fits, parallel_map=parallel_map)
-    looked = ScoreTest(
+    scored = ScoreTest(
         score=40.0, scores={"mass": 40.0, "soil-adhesion": promised}, null=np.zeros(9), detectable={},
         starts={"soil-adhesion": ((0.7,),)},
     )  # fmt: skip
     met = sorted([fitted(PLAIN, 10.0), fitted(SHAPED, gained)], key=lambda f: f.left)
-    assert from_other_starts(cast(Inquiry, inquiry), base, met, looked, (0.0, 0.0)) == met
+    assert from_other_starts(cast(Inquiry, inquiry), base, met, scored, (0.0, 0.0)) == met
     return asked
 
 
@@ -73,18 +73,18 @@ def test_a_discontinuous_effect_is_scanned_not_linearised() -> None:
     made = recorded({**known, "effects.soil-adhesion.stress": 4.6e4}, speeds=(1.5, 2.5), rate=1000.0, noise=0.1)
     found = [dataset_of(name, *simulated(scenario().replaced(known), r)) for name, r in made]
     problem = Problem([e for e in found if e is not None])
-    align(problem)
+    estimate_time_shifts(problem)
     base = problem.fit((), ())
     assert base is not None
     assert not is_far(problem, base)  # from there all places are looked at
     c = next(c for c in candidates_of(problem.dataset, (), "drop") if c.id == "soil-adhesion")
     led = replace(c, id="soil-crust")  # any that is not
     assert (c.is_discontinuous, led.is_discontinuous) == (True, False)
-    looked = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={}, starts={c.key: ((0.01,),)})
+    scored = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={}, starts={c.key: ((0.01,),)})
     inquiry = Inquiry(
         problem=problem, candidates=(c,), groups=[[0], [1]], phases=[], say=lambda _: None, executor=Executor()
     )
-    (seen,) = screen(inquiry, base, [c], [0, 1], [b.shift for b in base.blocks], looked)
+    (seen,) = screen(inquiry, base, [c], [0, 1], [b.shift for b in base.blocks], scored)
     nearest = min(c.starts(), key=lambda x: abs(np.log(c.values(x)["stress"] / 4.6e4)))
     assert seen.starts[0] == nearest
     assert c.values(nearest)["stress"] == pytest.approx(8.14e4, rel=1e-3)  # of five over four decades
@@ -111,8 +111,8 @@ def test_the_best_oscillatory_effect_is_scanned_in_frequency(score: float, combe
     inquiry = SimpleNamespace(
         free=lambda _: [PLAIN, rings], fits=fits, parallel_map=lambda look, things: [None] * len(things)
     )
-    looked = ScoreTest(score=50.0, scores={"mass": 40.0, rings.key: score}, null=np.zeros(9), detectable={})
-    assert from_other_starts(cast(Inquiry, inquiry), best, [best, astray], looked, (0.0, 0.0)) == [best, astray]
+    scored = ScoreTest(score=50.0, scores={"mass": 40.0, rings.key: score}, null=np.zeros(9), detectable={})
+    assert from_other_starts(cast(Inquiry, inquiry), best, [best, astray], scored, (0.0, 0.0)) == [best, astray]
     assert asked == ["polish structural-compliance", "time structural-compliance"] * combed
 
 
@@ -120,7 +120,7 @@ def test_a_time_shift_is_that_of_the_lowest_minimum() -> None:
     made = recorded({}, speeds=(1.5, 2.5), rate=1000.0, noise=0.01)
     found = [dataset_of(name, *simulated(scenario(), r)) for name, r in made]
     problem = Problem([e for e in found if e is not None])
-    align(problem)
+    estimate_time_shifts(problem)
 
     def clocked(c: Candidate, *late: float) -> Fitted:
         blocks = [problem.block(r, (c,), (0.5,), problem.shifts[r] + s, 0.0) for r, s in enumerate(late)]
@@ -168,7 +168,7 @@ def test_a_misled_fit_restarts_and_goes_on_if_it_soon_gains() -> None:
     astray = [fitted("inertia", 900.0, (0.4, 0.9)), fitted("air-drag", 700.0, (0.4, 0.8))]
     problem = SimpleNamespace(again=lambda f: f)
     inquiry = cast(Inquiry, SimpleNamespace(fits=fits, problem=problem))
-    looked = ScoreTest(score=1.0, scores={}, null=np.zeros(1), detectable={}, starts={"inertia": ((0.7,),)})
-    found = _restarted_from_base(inquiry, base, [fitted("slope", 200.0, (0.5, 0.2)), *astray], looked)
+    scored = ScoreTest(score=1.0, scores={}, null=np.zeros(1), detectable={}, starts={"inertia": ((0.7,),)})
+    found = _restarted_from_base(inquiry, base, [fitted("slope", 200.0, (0.5, 0.2)), *astray], scored)
     assert [(f.candidates[-1].id, f.left) for f in found] == [("inertia", 250.0), ("air-drag", 310.0)]
     assert [j.start for j in asked] == [(0.5, 0.7), (0.5, 0.8), (0.5, 0.7)]

@@ -23,7 +23,7 @@ from rollover.diagnosis.fit.model_variants import with_fitted_shape
 from rollover.diagnosis.fit.parameterisation import coordinate, coordinates
 from rollover.diagnosis.fit.step import Inquiry, Screened, Step
 from rollover.diagnosis.fit.threshold_scan import threshold_ranges, with_threshold_traced
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.selection import restarts
@@ -68,8 +68,8 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
         say=lambda _: None,
         executor=Executor(),
     )
-    looked = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
-    (found,) = _damping_frequency_scan(inquiry, [led_astray], looked, [b.shift for b in led_astray.blocks])
+    scored = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
+    (found,) = _damping_frequency_scan(inquiry, [led_astray], scored, [b.shift for b in led_astray.blocks])
     assert found.left < 1.2 * count
     assert c.values(found.x)["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
     assert c.values(found.x)["damping"] == pytest.approx(true["damping"], rel=0.1)
@@ -92,12 +92,12 @@ def test_a_misfitted_nose_is_found_by_its_ringing(
     inquiry = Inquiry(
         problem=problem, candidates=[c], groups=[[0], [1, 2]], phases=[], say=lambda _: None, executor=Executor()
     )
-    looked = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
-    (found,) = _damping_frequency_scan(inquiry, [astray], looked, [b.shift for b in astray.blocks])
+    scored = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
+    (found,) = _damping_frequency_scan(inquiry, [astray], scored, [b.shift for b in astray.blocks])
     assert found.left < 1.2 * sum(e.count for e in problem.dataset)
     assert found.candidates[-1].values(found.x) == pytest.approx(true, rel=0.01)
     monkeypatch.setattr(restarts, "_by_frequency", lambda *_: [])
-    (near,) = _damping_frequency_scan(inquiry, [astray], looked, [b.shift for b in astray.blocks])
+    (near,) = _damping_frequency_scan(inquiry, [astray], scored, [b.shift for b in astray.blocks])
     assert near.left > 10.0 * found.left
 
 
@@ -185,7 +185,7 @@ def test_the_share_of_an_unweighed_nose_is_found() -> None:
     assert told == {name: pytest.approx(value, rel=0.05) for name, value in true.items()}
     reweighted = scenario().replaced({"effects.structural-compliance": {"nose_share": 0.2, "stiffness": None}})
     by_key = {c.key: c for c in candidates_of(problem.dataset, (), "drop", reweighted)}
-    assert by_key["structural-compliance"].shapes == {}
+    assert by_key["structural-compliance"].secondary == {}
 
 
 def test_a_threshold_is_found_though_a_fit_ended_at_another() -> None:
@@ -274,7 +274,7 @@ def test_an_abrupt_effect_is_led_by_its_smooth_shape(tmp_path: Path) -> None:
     case = make(plan(63, 20263301, ("single",))[43])
     [true] = [e["parameters"] for e in case.truth["effects"]]
     problem = judge_of_case(case, tmp_path)
-    align(problem)
+    estimate_time_shifts(problem)
     c = candidate(problem, "soil-crust")
     gains = []
     for begun in ((0.8125, 0.875), (0.0625, 0.125)):
@@ -306,16 +306,16 @@ def test_two_effects_without_a_first_are_tried_together() -> None:
     assert min(stiffer.left, heavier.left, beside.left) > 1.5 * count
     first = Step(base=base, fitted=stiffer, p_value=0.0, rivals=(stiffer, heavier))
     then = Step(base=stiffer, fitted=beside, p_value=0.0, rivals=(beside,))
-    looked = ScoreTest(score=9.0, scores={"guide-friction": 9.0}, null=np.zeros(9), detectable={})
+    scored = ScoreTest(score=9.0, scores={"guide-friction": 9.0}, null=np.zeros(9), detectable={})
     guide = Screened(candidate=c["guide-friction"], starts=tuple(c["guide-friction"].starts()), left=9.0, potential=0.0)
     phases = [phases_of(e) for e in problem.dataset]
     inquiry = Inquiry(
         problem=problem, candidates=[*c.values()], groups=[], phases=phases, say=lambda _: None, executor=Executor()
     )
-    alone = best_subsets(inquiry, [replace(first, screened=(guide,))], looked, stiffer)
+    alone = best_subsets(inquiry, [replace(first, screened=(guide,))], scored, stiffer)
     assert alone is not None  # what scored most need not have led anything
     assert alone[0][-1].fitted.label == "mass + guide-friction"
-    found = best_subsets(inquiry, [first, then], looked, beside)
+    found = best_subsets(inquiry, [first, then], scored, beside)
     assert found is not None
     (one, both), left = found
     assert one.fitted.label == "mass"

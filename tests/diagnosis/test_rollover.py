@@ -119,9 +119,9 @@ def test_candidates_begin_at_what_the_scenario_has() -> None:
     for travels in by_friction.values():
         assert all(b / a < 1.1 for a, b in pairwise(travels))
         assert (min(travels), max(travels)) == (pytest.approx(0.03, rel=0.1), pytest.approx(0.6, rel=0.1))
-    some = replace(load, places=tuple(load.starts()[:3]))
-    assert some.probes() == load.starts()[:3]
-    assert by_id["ground-friction"].probes() == by_id["ground-friction"].starts()
+    some = replace(load, points=tuple(load.starts()[:3]))
+    assert some.scan_points() == load.starts()[:3]
+    assert by_id["ground-friction"].scan_points() == by_id["ground-friction"].starts()
 
 
 def test_values_are_found_by_their_paths() -> None:

@@ -155,7 +155,9 @@ def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest
     )
     monkeypatch.setattr(statements, "refined_by_ensemble_mean", lambda _, fitted: fitted)
     monkeypatch.setattr(statements, "intervals", lambda *_, **__: told)
-    monkeypatch.setattr(statements, "confusion", lambda *_: [fit("soil-stiffness"), fit("inertia"), fit("soil-crust")])
+    monkeypatch.setattr(
+        statements, "confusion_set", lambda *_: [fit("soil-stiffness"), fit("inertia"), fit("soil-crust")]
+    )
     monkeypatch.setattr(
         statements, "strongest", lambda *given: one("soil-stiffness" if given[1:] == (None, both) else "inertia")
     )

@@ -13,7 +13,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry, Step
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.inference.lack_of_fit import Cell, Mismatch
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.selection import decision, explanation, forward_step, pairs, stepwise
@@ -45,12 +45,12 @@ def step(count: int) -> Step:
 
 def explanation_of(count: int, p_value: float) -> Explanation:
     parts = tuple(step(k + 1) for k in range(count))
-    looked = ScoreTest(score=99.0, scores={}, null=np.zeros(10), detectable={})
+    scored = ScoreTest(score=99.0, scores={}, null=np.zeros(10), detectable={})
     return Explanation(
         base=parts[0].base,
         fitted=parts[-1].fitted,
         parts=parts,
-        looked=looked,
+        scored=scored,
         detectable={},
         before=left(0.0, structure=1e5),
         after=left(p_value),
@@ -146,7 +146,7 @@ def test_a_maybe_null_effect_is_dropped_if_another_does_its_work(
     changes = {f"effects.sensor-lag.{k}": v for k, v in lag.items()}
     changes |= {f"effects.sensor-clock-offset.{k}": v for k, v in clock.items()} if offset else {}
     problem = judge_of(recorded(changes, speeds=(1.5, 2.5), channels=(FORCE, DEPTH, ACCELERATION), noise=0.001))
-    align(problem)
+    estimate_time_shifts(problem)
     able = candidates_of(problem.dataset, (), "drop")
     both = [
         next(c for c in able if (c.id, c.channel) == (id, ACCELERATION)) for id in ("sensor-lag", "sensor-clock-offset")
@@ -245,7 +245,7 @@ def test_a_simpler_rival_that_fits_as_well_is_named_beside(
 
     base, best = fitted("none", 1000.0, 0), fitted("soil-viscous-damping", 100.0, 2)
     rival = fitted("soil-inertial-drag", 100.0 + more, numbers)
-    found = forward_step.confusion(Step(base=base, fitted=best, p_value=0.0, rivals=(best, rival)), [])
+    found = forward_step.confusion_set(Step(base=base, fitted=best, p_value=0.0, rivals=(best, rival)), [])
     assert found == ([best, rival] if named else [best])
 
 
@@ -314,7 +314,7 @@ def test_effects_that_may_be_any_others_are_not_named(judged: dict[str, float]) 
     problem = cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops))
     found = explanation_of(SETTINGS.selection.flexibility.most_effects, 0.4)
     assert len(verdict_on(problem, found, [], [])[0].parts) == SETTINGS.selection.flexibility.most_effects
-    refused, verdict = verdict_on(problem, replace(found, settled=False), [], [])
+    refused, verdict = verdict_on(problem, replace(found, is_unique=False), [], [])
     assert (refused.parts, verdict) == ((), "unexplained")
 
 

@@ -92,7 +92,7 @@ def test_phases_are_those_of_the_run_that_stands_for_all() -> None:
 def test_a_shape_that_is_not_fitted_widens_an_interval(monkeypatch: pytest.MonkeyPatch) -> None:
     """y = 20 (x + f) sin t with f from 0 to 1 unknown: x is known to sqrt(1/12) and no better."""
     problem = Problem([dataset(4, 0.0)])
-    alone = replace(SLOPE, shapes={"other": Search(0.0, 1.0)})
+    alone = replace(SLOPE, secondary={"other": Search(0.0, 1.0)})
     monkeypatch.setattr(Candidate, "with_secondary", lambda self, x: [(*x, 0.5)])
     block = problem.block(0, (SLOPE,), (0.4,), 0.0, problem.effort.fine)
     assert block is not None

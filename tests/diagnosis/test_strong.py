@@ -52,7 +52,7 @@ def tipped(size: float) -> tuple[Problem, Fitted]:
 def test_an_effect_that_shows_only_when_strong_is_found() -> None:
     problem, base = tipped(20.0)
     mass, groups = MASS, [[r] for r in range(4)]
-    found = scan.look(problem, base, [mass, SLOPE], groups)
+    found = scan.score_candidates(problem, base, [mass, SLOPE], groups)
     assert found.scores["mass"] > 100.0 * found.scores["slope"]
     assert found.far == {"slope": ((0.95,),)}  # a mass leaves 0.91^2 of it, more than is followed
     assert found.leading[0] == "slope"
@@ -64,17 +64,19 @@ def test_an_effect_that_shows_only_when_strong_is_found() -> None:
     assert (0.95,) in begun.starts
     assert screen(inquiry, base, [SLOPE], [0, 1], [0.0] * 4, replace(found, far={}))[0].starts != begun.starts
     problem.heavy_tailed = True
-    assert scan.look(problem, base, [mass, SLOPE], groups).far == {}  # of what perturbed runs so far, chance may be all
+    assert (
+        scan.score_candidates(problem, base, [mass, SLOPE], groups).far == {}
+    )  # of what perturbed runs so far, chance may be all
 
 
 def test_where_known_runs_must_do_no_strong_effect_is_tried() -> None:
     problem, base = tipped(20.0)
     groups = [[r] for r in range(4)]
-    scan.look(problem, base, [MASS, SLOPE], groups, base, [0, 1])
+    scan.score_candidates(problem, base, [MASS, SLOPE], groups, base, [0, 1])
     known = problem.simulations
-    assert scan.look(problem, base, [MASS, SLOPE], groups, base, [0, 1]).far == {}
+    assert scan.score_candidates(problem, base, [MASS, SLOPE], groups, base, [0, 1]).far == {}
     assert problem.simulations == known
-    assert list(scan.look(problem, base, [MASS, SLOPE], groups).far) == ["slope"]
+    assert list(scan.score_candidates(problem, base, [MASS, SLOPE], groups).far) == ["slope"]
     assert problem.simulations > known
 
 
@@ -159,9 +161,9 @@ def test_an_effect_is_strong_at_each_end_of_its_range() -> None:
         search={"mass": Search(1.0, 1000.0, "log"), "length": Search(0.1, 1.0)},
     )  # fmt: skip
     places = tank.strong()
-    assert set(tank.probes()) < set(places)
-    assert {x for x, _ in set(places) - set(tank.probes())} == {0.9}
-    assert {y for _, y in places} == {y for _, y in tank.probes()}
+    assert set(tank.scan_points()) < set(places)
+    assert {x for x, _ in set(places) - set(tank.scan_points())} == {0.9}
+    assert {y for _, y in places} == {y for _, y in tank.scan_points()}
 
 
 def test_a_limit_starts_where_it_is_reached_despite_its_misfit() -> None:
@@ -187,9 +189,9 @@ def test_a_limit_starts_where_it_is_reached_despite_its_misfit() -> None:
     inquiry = Inquiry(
         problem=problem, candidates=(limit,), groups=[], phases=[], say=lambda _: None, executor=Executor()
     )
-    looked = replace(scan.look(problem, base, [limit], [[r] for r in range(4)]), far={})
-    found = screen(inquiry, base, [limit], [0, 1], [0.0] * 4, looked)[0]
-    nothing_yields = [x for x in limit.probes() if abs(x[0] - null) < 0.1]
+    scored = replace(scan.score_candidates(problem, base, [limit], [[r] for r in range(4)]), far={})
+    found = screen(inquiry, base, [limit], [0, 1], [0.0] * 4, scored)[0]
+    nothing_yields = [x for x in limit.scan_points() if abs(x[0] - null) < 0.1]
     assert nothing_yields
     assert found.left > sum(b.residual @ b.residual for b in blocks[:2])  # which is what these leave
     assert found.starts == ((null + SETTINGS.fit.parameterisation.zero_step,), (gives_way,))

@@ -69,7 +69,7 @@ def taken(base: Fitted, found: Fitted) -> Taken:
     left = Mismatch(p_value=0.0, cells=(), adjusted=())
     return Taken(
         base=base, steps=(step,) if found.candidates else (), fitted=found, before=left, left=left, first=step,
-        at_first=cast(Any, None), looked=cast(Any, None),
+        at_first=cast(Any, None), scored=cast(Any, None),
     )  # fmt: skip
 
 
@@ -100,7 +100,7 @@ def test_a_truncated_fit_is_a_start_if_it_gains_much(
     early = SimpleNamespace(dataset=["cut"], fit=lambda *_: fit((), 900.0), simulations=4)
     monkeypatch.setattr(truncated_start, "_cut", lambda *_: "cut")
     monkeypatch.setattr(truncated_start, "Problem", lambda _: early)
-    monkeypatch.setattr(truncated_start, "align", lambda _: None)
+    monkeypatch.setattr(truncated_start, "estimate_time_shifts", lambda _: None)
     monkeypatch.setattr(truncated_start, "forward_selection", one_by_one)
     back = {"moves": np.inf}
     monkeypatch.setattr(truncated_start, "rebound_residual", lambda *_: back["moves"])
@@ -156,7 +156,7 @@ def test_holding_ground_moves_nothing_during_unloading(rig: dict[str, float], is
     assert (
         moved > 0.1 * beyond if is_back else abs(moved) < 0.1 * SETTINGS.selection.truncated_start.least_share * beyond
     )
-    early = [truncated_start._cut(e, p, truncated_start.ENDS[0]) for e, p in zip(dataset, phases, strict=True)]
+    early = [truncated_start._cut(e, p, truncated_start.TRUNCATIONS[0]) for e, p in zip(dataset, phases, strict=True)]
     cut = Problem([e for e in early if e is not None])
     above = cut.fit((), ())
     assert above is not None

@@ -113,11 +113,11 @@ def with_rounding_uncertainty(
         shares = [sigma / abs(v) if v else math.inf for v in values]
         if values and max(shares) <= ROUNDING.most_rounding and max(shares) > ROUNDING.least_rounding:
             known[path] = sigma
-    digits = [
+    rounded = [
         (name, replace(r, uncertainty={**{p: s for p, s in known.items() if p in r.conditions}, **r.uncertainty}))
         for name, r in recordings
     ]
-    return digits, [
+    return rounded, [
         f"{path} is taken as rounded, +-{s:.2g}: state it as `uncertainty` in the sidecar" for path, s in known.items()
     ]
 

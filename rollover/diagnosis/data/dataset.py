@@ -30,7 +30,7 @@ from rollover.system.errors import Fault
 Array = NDArray[np.float64]
 
 TUNING = SETTINGS.data.dataset
-NOTHING: Mapping[str, Array] = MappingProxyType({})
+EMPTY: Mapping[str, Array] = MappingProxyType({})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,8 +72,8 @@ class Signal:
     def spread(self) -> Noise:
         """What its samples are whitened by; the noise alone grows with the value, not what a model may be off by."""
         rest = max(self.sigma**2 - self.noise**2, 0.0)
-        loud = None if self.level is None else np.sqrt((self.noise * self.level) ** 2 + rest)
-        return Noise(count=self.rows.size, sigma=self.sigma, ar=self.ar, loud=loud, weight=self.weight)
+        sd = None if self.level is None else np.sqrt((self.noise * self.level) ** 2 + rest)
+        return Noise(count=self.rows.size, sigma=self.sigma, ar=self.ar, sd=sd, weight=self.weight)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,7 +206,7 @@ class Dataset:
         """The same of the measurement."""
         return self.whitened(self.values)
 
-    def discontinuities(self, raw: Array, predicted: Mapping[str, Array] = NOTHING) -> NDArray[np.int64]:
+    def discontinuities(self, raw: Array, predicted: Mapping[str, Array] = EMPTY) -> NDArray[np.int64]:
         """Samples (stacked) about which a prediction jumps, and means within which it is `predicted` to."""
         own = self._inside
         found: NDArray[np.bool_] = near_discontinuity(raw, own.least, own.first, own.last)

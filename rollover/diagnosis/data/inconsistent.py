@@ -31,7 +31,7 @@ from rollover.spec.channels import UNITS, describe
 
 TUNING = SETTINGS.data.inconsistent
 # times its prior, where a time shift is looked for
-PLACES = np.linspace(-TUNING.shift_width, TUNING.shift_width, TUNING.shift_steps)
+SHIFTS = np.linspace(-TUNING.shift_width, TUNING.shift_width, TUNING.shift_steps)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -116,7 +116,7 @@ def relative_scale(e: Dataset, s: Signal, made: np.ndarray) -> float | None:
     """How many times what is simulated a signal reads, where the two are alike; None if nowhere."""
     time, m, best = e.recording.time[s.rows], s.values, (0.0, 0.0)
     size = float(np.linalg.norm(m))
-    for shift in PLACES * e.shift_prior:
+    for shift in SHIFTS * e.shift_prior:
         p = np.interp(time - shift, time, made[s.rows])
         power = float(p @ p)
         if size > 0.0 and power > 0.0:

@@ -65,11 +65,11 @@ def cross_validated(problem: Problem, fitted: Fitted, groups: Sequence[Sequence[
     if not fitted.x:
         return fitted
     left: list[float] = [b.normal()[2] for b in fitted.blocks]
-    places = {
+    points = {
         r: np.clip(np.array(fitted.x) + _leave_out_step(fitted, group), 0.0, 1.0) for group in groups for r in group
     }
-    problem.made_ahead((r, fitted.candidates, [float(v) for v in x]) for r, x in places.items())
-    for r, x in places.items():
+    problem.made_ahead((r, fitted.candidates, [float(v) for v in x]) for r, x in points.items())
+    for r, x in points.items():
         old = fitted.blocks[r]
         shift = old.shift + time_shift_step(old, x - np.array(fitted.x))
         there = problem.clocked(r, fitted.candidates, [float(v) for v in x], shift, problem.effort.clocked)
@@ -97,8 +97,8 @@ def cross_validated_by_refits(
         return fitted
     shifts = [b.shift for b in fitted.blocks]
     left = [b.normal()[2] for b in fitted.blocks]
-    look = partial(_held_out_refit, at=(fitted.candidates, fitted.x), shifts=shifts)
-    for group, found in zip(groups, parallel_map(problem, look, groups), strict=True):
+    refit = partial(_held_out_refit, at=(fitted.candidates, fitted.x), shifts=shifts)
+    for group, found in zip(groups, parallel_map(problem, refit, groups), strict=True):
         if found is None:
             return fitted
         for r, there in zip(group, found, strict=True):

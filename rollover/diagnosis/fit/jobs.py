@@ -18,7 +18,7 @@ from typing import Any, cast
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import linearised, polish, with_time_shift_search
-from rollover.diagnosis.fit.model_variants import in_other_form, with_fitted_shape
+from rollover.diagnosis.fit.model_variants import as_variant, with_fitted_shape
 from rollover.diagnosis.fit.tasks import Progress, R, T, Task, serial_map
 from rollover.diagnosis.fit.threshold_scan import with_threshold_traced
 from rollover.diagnosis.forward.interface import FailedModelError
@@ -110,32 +110,34 @@ class Executor:
             ended(k, fitted)
         return found
 
-    def parallel_map(self, problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T]) -> list[R]:
-        """What a `look` at each thing tells, in their order: here, or spread over the children once they are there.
+    def parallel_map(self, problem: Problem, function: Callable[[Problem, T], R], items: Sequence[T]) -> list[R]:
+        """`function(problem, item)` of each, in their order: here, or spread over the children once they are there.
 
-        `look` and what it returns are sent to them: a function of a module, or a partial of one.
+        `function` and what it returns are sent to them: a function of a module, or a partial of one.
         """
-        if problem.effort.is_ensemble or len(things) < 2 or not self.is_there():
-            return serial_map(problem, look, things)
+        if problem.effort.is_ensemble or len(items) < 2 or not self.is_there():
+            return serial_map(problem, function, items)
         shared = self._shared_file(problem, self._about(problem))
-        shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
+        shares = [list(items)[k :: 2 * self.workers] for k in range(2 * self.workers)]
         found: dict[int, R] = {}
-        for start, (seen, made) in enumerate(self.each(_looked, [(shared, look, share) for share in shares if share])):
+        for start, (seen, made) in enumerate(
+            self.each(_mapped, [(shared, function, share) for share in shares if share])
+        ):
             problem.simulations += made
             found |= {start + 2 * self.workers * k: one for k, one in enumerate(seen)}
-        return [found[k] for k in range(len(things))]
+        return [found[k] for k in range(len(items))]
 
-    def each(self, function: Callable[[T], R], things: Sequence[T]) -> list[R]:
-        """What a function of a module makes of each thing, in their order: here, or in the children once there."""
+    def each(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+        """`function(item)` of each, in their order: here, or in the children once there."""
         if not self.is_there():
-            return [function(thing) for thing in things]
+            return [function(item) for item in items]
         found: dict[int, R] = {}
-        for outcome in map_cases(function, things, children=self.children):
+        for outcome in map_cases(function, items, children=self.children):
             if outcome.failure is not None:
                 name = getattr(function, "__name__", "a child").strip("_")
                 raise _failed(name, outcome.failure)
             found[outcome.index] = cast(R, outcome.value)
-        return [found[k] for k in range(len(things))]
+        return [found[k] for k in range(len(items))]
 
     def _about(self, problem: Problem) -> str:
         """What all fits depend on beside their jobs."""
@@ -153,8 +155,8 @@ class Executor:
     def _note(self, key: str, fitted: Fitted | None) -> None:
         row: dict[str, Any] | None = None
         if fitted is not None:
-            form = dict(fitted.candidates[-1].form) if fitted.candidates else {}
-            row = {"x": list(fitted.x), "shifts": [b.shift for b in fitted.blocks], "form": form}
+            variant = dict(fitted.candidates[-1].variant) if fitted.candidates else {}
+            row = {"x": list(fitted.x), "shifts": [b.shift for b in fitted.blocks], "form": variant}
         self._done[key] = row
         if self.notebook is not None:
             self.notebook.parent.mkdir(parents=True, exist_ok=True)
@@ -195,8 +197,8 @@ def work(problem: Problem, task: Task) -> Fitted | None:
     if task.how == "shape":
         return (
             with_fitted_shape(problem, begun, leaves)
-            if task.form is None
-            else in_other_form(problem, begun, task.form, leaves)
+            if task.variant is None
+            else as_variant(problem, begun, task.variant, leaves)
         )
     if task.stretch is not None:
         return with_threshold_traced(problem, begun, task.stretch)
@@ -223,24 +225,24 @@ _held: dict[Path, Problem] = {}  # in a child: what it simulated for the job bef
 
 
 def _begun(shared: Path) -> None:
-    _kept(shared).fit((), (), rounds=1)
+    _problem_of(shared).fit((), (), rounds=1)
 
 
 def _worked(case: tuple[Path, Task]) -> tuple[Fitted | None, int]:
     shared, task = case
-    problem = _kept(shared)
+    problem = _problem_of(shared)
     before = problem.simulations
     return work(problem, task), problem.simulations - before
 
 
-def _looked(case: tuple[Path, Callable[[Problem, Any], Any], list[Any]]) -> tuple[list[Any], int]:
-    shared, look, things = case
-    problem = _kept(shared)
+def _mapped(case: tuple[Path, Callable[[Problem, Any], Any], list[Any]]) -> tuple[list[Any], int]:
+    shared, function, items = case
+    problem = _problem_of(shared)
     before = problem.simulations
-    return serial_map(problem, look, things), problem.simulations - before
+    return serial_map(problem, function, items), problem.simulations - before
 
 
-def _kept(shared: Path) -> Problem:
+def _problem_of(shared: Path) -> Problem:
     """The judge of a file, with what it simulated before."""
     if shared not in _held:
         _held.clear()
@@ -252,8 +254,8 @@ def _rebuilt(problem: Problem, task: Task, row: dict[str, Any] | None) -> Fitted
     if row is None:
         return None
     candidates = list(task.candidates)
-    if candidates and row["form"] != candidates[-1].form:
-        candidates[-1] = next(c for c in candidates[-1].forms() if c.form == row["form"])
+    if candidates and row["form"] != candidates[-1].variant:
+        candidates[-1] = next(c for c in candidates[-1].variants() if c.variant == row["form"])
     elif len(row["x"]) > len(task.start):
         candidates[-1] = candidates[-1].whole()
     has_no_jacobian = task.how == "fit" and task.rounds is not None  # it ended without slopes

@@ -199,6 +199,6 @@ def without_shift_direction(vectors: Array, block: ResidualBlock) -> Array:
     return np.asarray(vectors - shrink * np.outer(s, s @ vectors))
 
 
-def ends_at_bound(fitted: Fitted) -> bool:
+def is_at_bound(fitted: Fitted) -> bool:
     """Whether a number of the last effect stands at an end of its range."""
     return any(at_an_end(v) for v in fitted.own)

@@ -17,8 +17,10 @@ from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.fit.local_search
-SPREAD = (np.arange(TUNING.coarse_shapes) + 0.5) / TUNING.coarse_shapes  # places of a shape that goes along with them
-SCANNED = (np.arange(TUNING.fine_shapes) + 0.5) / TUNING.fine_shapes  # places of a shape
+SPREAD = (
+    np.arange(TUNING.coarse_secondary) + 0.5
+) / TUNING.coarse_secondary  # places of a shape that goes along with them
+SCANNED = (np.arange(TUNING.fine_secondary) + 0.5) / TUNING.fine_secondary  # places of a shape
 
 
 def left_at(
@@ -52,12 +54,12 @@ def blocks_at(
 def ranked_by_misfit(
     problem: Problem,
     candidates: Sequence[Candidate],
-    places: Sequence[tuple[float, ...]],
+    points: Sequence[tuple[float, ...]],
     shifts: Sequence[float],
     only: Sequence[int] | None = None,
 ) -> list[tuple[float, ...]]:
     """Those places that can be simulated, the one that leaves least of all recordings or `only` some first."""
-    met = [(there, x) for x in places if (there := left_at(problem, candidates, x, shifts, only)) is not None]
+    met = [(there, x) for x in points if (there := left_at(problem, candidates, x, shifts, only)) is not None]
     return [x for _, x in sorted(met)]
 
 
@@ -103,10 +105,12 @@ def frequency_scan(last: Candidate, own: Sequence[float]) -> tuple[Candidate, li
 
     One that was fitted beside a wrong frequency hardly rings any more: what it rings by is not to be seen from there.
     """
-    whole = replace(last.whole(), along=tuple(last.shapes))
+    whole = replace(last.whole(), along=tuple(last.secondary))
     firsts = np.clip(own[0] + TUNING.frequency_half_width * np.linspace(-1.0, 1.0, TUNING.frequency_count), 0.0, 1.0)
-    shapes = itertools.product(*(SPREAD for _ in last.shapes))
-    return whole, [(float(a), b, *map(float, shape)) for shape in shapes for a in firsts for b in TUNING.light_damping]
+    secondaries = itertools.product(*(SPREAD for _ in last.secondary))
+    return whole, [
+        (float(a), b, *map(float, shape)) for shape in secondaries for a in firsts for b in TUNING.light_damping
+    ]
 
 
 def separate_minima(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
@@ -131,12 +135,12 @@ def starts_along_shape(last: Candidate, x: Sequence[float]) -> list[tuple[float,
 
 
 def smallest_misfit(
-    problem: Problem, thing: tuple[Sequence[Candidate], Sequence[tuple[float, ...]]], *, shifts: Sequence[float]
+    problem: Problem, item: tuple[Sequence[Candidate], Sequence[tuple[float, ...]]], *, shifts: Sequence[float]
 ) -> tuple[float, tuple[float, ...]] | None:
     """What is left of all recordings at that of some places where it is least, and this; None if all runs fail."""
-    candidates, places = thing
+    candidates, points = item
     least, best = np.inf, None
-    for x in places:
+    for x in points:
         left = 0.0
         for r, shift in enumerate(shifts):
             block = problem.block(r, candidates, x, shift, 0.0)

@@ -69,8 +69,8 @@ class TaskRunner(Protocol):
     def fits(self, problem: Problem, tasks: Sequence[Task], say: Progress = ...) -> list[Fitted | None]:
         """Fits in the order of the tasks; None where nothing could be simulated."""
 
-    def parallel_map(self, problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T], /) -> list[R]:
-        """`look(problem, thing)` of each, in their order."""
+    def parallel_map(self, problem: Problem, function: Callable[[Problem, T], R], items: Sequence[T], /) -> list[R]:
+        """`function(problem, item)` of each, in their order."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,9 +90,9 @@ class Inquiry:
         return [c for c in self.candidates if c.key not in used]
 
     def fits(self, tasks: Sequence[Task]) -> list[Fitted | None]:
-        """What comes of jobs, in their order."""
+        """Fits of tasks, in their order; None where nothing could be simulated."""
         return self.executor.fits(self.problem, tasks, self.say)
 
-    def parallel_map(self, look: Callable[[Problem, T], R], things: Sequence[T]) -> list[R]:
-        """What a look at each thing tells, in their order; see `Executor.parallel_map`."""
-        return self.executor.parallel_map(self.problem, look, things)
+    def parallel_map(self, function: Callable[[Problem, T], R], items: Sequence[T]) -> list[R]:
+        """`function(problem, item)` of each, in their order; see `Executor.parallel_map`."""
+        return self.executor.parallel_map(self.problem, function, items)

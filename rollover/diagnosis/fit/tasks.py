@@ -24,15 +24,15 @@ R = TypeVar("R")
 
 
 class ParallelMap(Protocol[P]):
-    """A map over things, of a function that is given the problem too."""
+    """A map over items by a function that is given the problem too."""
 
-    def __call__(self, problem: P, look: Callable[[P, T], R], things: Sequence[T], /) -> list[R]:
-        """`look(problem, thing)` of each, in their order."""
+    def __call__(self, problem: P, function: Callable[[P, T], R], items: Sequence[T], /) -> list[R]:
+        """`function(problem, item)` of each, in their order."""
 
 
-def serial_map(problem: Q, look: Callable[[Q, T], R], things: Sequence[T]) -> list[R]:
-    """`look(problem, thing)` of each, one after another."""
-    return [look(problem, thing) for thing in things]
+def serial_map(problem: Q, function: Callable[[Q, T], R], items: Sequence[T]) -> list[R]:
+    """`function(problem, item)` of each, one after another."""
+    return [function(problem, item) for item in items]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ class Task:
 
     One of few `rounds` is a first look: it ends without slopes.
     "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
-    `form`, "time" tries out the time shifts, "trace" begins anew where it sets in, over a `stretch`. A shape or form
+    `variant`, "time" tries out the time shifts, "trace" begins anew where it sets in, over a `stretch`. A shape or form
     that comes nowhere near what the best fit `leaves` of each recording is not gone on with. `reused` as in
     `Problem.fit`.
     """
@@ -54,15 +54,15 @@ class Task:
     rounds: int | None = None  # as many as a whole fit may take
     width: int = 0
     fixed_shifts: bool = False
-    form: Candidate | None = None
+    variant: Candidate | None = None
     stretch: Stretch | None = None
     leaves: tuple[float, ...] | None = None
     reused: tuple[NDArray[np.float64], ...] | None = None
 
     def key(self, about: str) -> str:
         """Hash of what is fitted and from where, with `about` for all else that it depends on."""
-        every = (*self.candidates, *(() if self.form is None else (self.form,)))
-        names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in every]
+        every = (*self.candidates, *(() if self.variant is None else (self.variant,)))
+        names = [(c.key, sorted(c.search.items()), sorted(c.variant.items())) for c in every]
         ways = self.how, self.only, self.rounds, self.width, self.fixed_shifts, self.stretch, self.leaves
         shared = hashlib.sha256(repr((about, names, self.start, self.shifts, ways)).encode())
         for J in self.reused or ():

@@ -34,8 +34,8 @@ def threshold_ranges(fitted: Fitted) -> list[Stretch]:
         names = [name for name in last.search if name in EFFECTS[last.id].shapes]
     else:
         names = [name for name in last.search if (name == strength) == is_clock(fitted)]
-    places = [at + list(last.search).index(name) for name in names]
-    return [s for k in places for s in ((k, 0.0, fitted.x[k]), (k, fitted.x[k], 1.0))]
+    points = [at + list(last.search).index(name) for name in names]
+    return [s for k in points for s in ((k, 0.0, fitted.x[k]), (k, fitted.x[k], 1.0))]
 
 
 def is_clock(fitted: Fitted) -> bool:
@@ -72,8 +72,8 @@ def threshold_starts(
         return None
     alone = Fitted(candidates=first, x=x, blocks=tuple(blocks))
     best, least = None, alone.total
-    for place in second.probes():
-        there = _matched_strength(problem, alone, second, (*x, *place), few)
+    for point in second.scan_points():
+        there = _matched_strength(problem, alone, second, (*x, *point), few)
         left = None if there is None else left_at(problem, (*first, second), there, shifts, few)
         if left is not None and left < least:
             best, least = there, left
@@ -97,7 +97,7 @@ def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) ->
         return best
     alone = Fitted(candidates=fitted.candidates[:-1], x=fitted.x[:at], blocks=tuple(blocks))
     met = []
-    for v in _places(fitted, stretch):
+    for v in _scan_points(fitted, stretch):
         there = (*fitted.x[:k], float(v), *fitted.x[k + 1 :])
         x = there if is_clock(fitted) else _matched_strength(problem, alone, last, there, few)
         left = None if x is None else left_at(problem, fitted.candidates, x, shifts, few)
@@ -110,13 +110,13 @@ def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) ->
 
 
 def _best_start(
-    problem: Problem, fitted: Fitted, places: Sequence[tuple[float, ...]], few: Sequence[int]
+    problem: Problem, fitted: Fitted, points: Sequence[tuple[float, ...]], few: Sequence[int]
 ) -> list[tuple[float, ...]]:
     """Of several places those from which a short fit to `few` recordings comes to less than one from where a fit is."""
     at = [fitted.blocks[r].shift for r in few]
     short = [
         problem.fit(fitted.candidates, x, rounds=TUNING.short_rounds, only=few, shifts=at, width=1, no_jacobian=True)
-        for x in (fitted.x, *places)
+        for x in (fitted.x, *points)
     ]
     own = np.inf if short[0] is None else short[0].total
     return [one.x for one in short[1:] if one is not None and one.total < own]
@@ -127,7 +127,7 @@ def _along_frequency_ridge(problem: Problem, fitted: Fitted, stretch: Stretch) -
     shifts, at = [b.shift for b in fitted.blocks], len(fitted.x) - len(fitted.own)
     variant, own = fitted.candidates[-1].reshaped(fitted.own)
     candidates, x = (*fitted.candidates[:-1], variant), (*fitted.x[:at], *own)
-    there = [(*x[: stretch[0]], v, *x[stretch[0] + 1 :]) for v in _places(fitted, stretch)]
+    there = [(*x[: stretch[0]], v, *x[stretch[0] + 1 :]) for v in _scan_points(fitted, stretch)]
     few = representative_recordings(fitted)
     met = [(left, y) for y in there if (left := left_at(problem, candidates, y, shifts, few)) is not None]
     best = fitted
@@ -140,7 +140,7 @@ def _along_frequency_ridge(problem: Problem, fitted: Fitted, stretch: Stretch) -
     return best
 
 
-def _places(fitted: Fitted, stretch: Stretch) -> list[float]:
+def _scan_points(fitted: Fitted, stretch: Stretch) -> list[float]:
     """Where on its stretch a coordinate is tried."""
     k, low, high = stretch
     return sorted(float(v) for v in (*AFAR, *(fitted.x[k] + NEAR)) if low <= v <= high and 0.0 < v < 1.0)

@@ -37,10 +37,10 @@ Made = Callable[[float], Array | None]
 Cost = Callable[[Array, Array], Array]  # of runs (m, n), each that many of the shifts (m,) late, s: what each leaves
 
 
-def align(problem: Problem) -> None:
+def estimate_time_shifts(problem: Problem) -> None:
     """Begin with the time shift at which each recording meets the scenario best."""
     for r, e in enumerate(problem.dataset if problem.effort.is_timed else ()):
-        found = _best(problem, r, partial(problem.raw, r, (), ()), partial(_whole, problem, r), _places(e))
+        found = _best(problem, r, partial(problem.raw, r, (), ()), partial(_whole, problem, r), _scan_points(e))
         problem.shifts[r] = problem.shifts[r] if found is None else found
 
 
@@ -65,12 +65,12 @@ def _by_contact(problem: Problem, r: int, *, beside: Point) -> float | None:
 def _first_contact(problem: Problem, r: int, made: Made) -> float | None:
     """Time shift (s) of recording r by its first contact: found without a model, then beside there by the model."""
     e = problem.dataset[r]
-    places = _places(e)
+    shifts = _scan_points(e)
     # what never fell tells of no contact
-    places = places[places + e.simulator.contact > e.recording.time[TUNING.early_samples]]
-    if not (np.isfinite(e.simulator.contact) and places.size):
+    shifts = shifts[shifts + e.simulator.contact > e.recording.time[TUNING.early_samples]]
+    if not (np.isfinite(e.simulator.contact) and shifts.size):
         return None
-    about = _best(problem, r, made, partial(onset, problem, r), places)
+    about = _best(problem, r, made, partial(onset, problem, r), shifts)
     if about is None or not _is_free_fall(problem, r, made(about), about):
         return None
     at = _best(
@@ -188,7 +188,7 @@ def _with_weights_moved(e: Dataset, shift: float) -> Dataset:
     return replace(e, signals=tuple(moved))
 
 
-def _places(e: Dataset) -> Array:
+def _scan_points(e: Dataset) -> Array:
     """Time shifts (s) that a recording's may be."""
     return np.asarray(TUNING.search_width * e.shift_prior * np.linspace(-1.0, 1.0, TUNING.search_count))
 

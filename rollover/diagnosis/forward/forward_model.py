@@ -147,7 +147,7 @@ class DropSimulator:
         if values not in self._raw:
             at = times - shift
             rows = self._track(physical, float(at[-1]) if at.size else 0.0).rows(at)
-            self._keep(self._raw, values, channels_of(rows, self.recording.channels), TUNING.kept_predictions)
+            self._keep(self._raw, values, channels_of(rows, self.recording.channels), TUNING.cached_predictions)
         return self._raw[values]
 
     def _track(self, physical: Mapping[str, Any], until: float) -> Track:
@@ -156,7 +156,7 @@ class DropSimulator:
         found = self._tracks.pop(key, None)
         if found is None or found.until < until:
             found = self._model(physical).track(until + TUNING.track_margin)
-        self._keep(self._tracks, key, found, TUNING.kept_tracks)
+        self._keep(self._tracks, key, found, TUNING.cached_tracks)
         return found
 
     def _model(self, changes: Mapping[str, Any]) -> DropModel:
@@ -168,7 +168,7 @@ class DropSimulator:
             is_abrupt = has_own or any(effect.is_abrupt for effect in own.effects.values())
             may_jump = any(effect.force_terms() and not effect.is_smooth for effect in own.effects.values())
             step = TUNING.shortest_step if may_jump else TUNING.abrupt_step if is_abrupt else TUNING.longest_step
-            self._keep(self._models, key, DropModel(scenario=own, step=step), TUNING.kept_predictions)
+            self._keep(self._models, key, DropModel(scenario=own, step=step), TUNING.cached_predictions)
         return self._models[key]
 
     @staticmethod
@@ -208,11 +208,11 @@ def set_up(scenario: Scenario, recording: Recording) -> Scenario:
         hash(conditions)
     except TypeError:  # a value without a hash
         return _under(scenario, recording.conditions, recording.title)
-    return _kept_under(Itself(scenario), conditions, recording.title)
+    return _cached_under(Itself(scenario), conditions, recording.title)
 
 
-@lru_cache(maxsize=TUNING.kept_scenarios)  # each stage of a diagnosis asks for it, and reading values takes 10 ms
-def _kept_under(scenario: Itself, conditions: tuple[tuple[str, type, Any], ...], title: str) -> Scenario:
+@lru_cache(maxsize=TUNING.cached_scenarios)  # each stage of a diagnosis asks for it, and reading values takes 10 ms
+def _cached_under(scenario: Itself, conditions: tuple[tuple[str, type, Any], ...], title: str) -> Scenario:
     return _under(scenario.thing, {path: value for path, _, value in conditions}, title)
 
 

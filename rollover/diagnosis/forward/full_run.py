@@ -124,7 +124,7 @@ class RunSimulator:
         applied, run = known
         key = _key(changes)
         if key not in self._behind:
-            if len(self._behind) >= TUNING.kept_runs:
+            if len(self._behind) >= TUNING.cached_runs:
                 self._behind.pop(next(iter(self._behind)))
             seen = as_measured(applied, run, self.recording)
             self._behind[key] = (
@@ -285,7 +285,7 @@ class RunSimulator:
             self._limit = max(TUNING.slowest_ratio * made.seconds, TUNING.least_wall_time)
         if made.run is not None and all(path == CENTRE for path, _ in making.key):
             self._phases[making.scenario.ground.elements.centre] = made.phases
-        if len(self._known) >= TUNING.kept_runs:
+        if len(self._known) >= TUNING.cached_runs:
             self._known.pop(next(iter(self._known)))
         self._known[making.key] = made.run
 

@@ -238,9 +238,9 @@ def _of_channel(channel: str, problem: Problem, base: Fitted) -> tuple[list[Mode
                 slots.append((e, b, part))
     models: list[Model] = []
 
-    def add(on: str, shapes: Sequence[Array]) -> None:
+    def add(on: str, functions_at: Sequence[Array]) -> None:
         columns = []
-        for (e, b, part), f in zip(slots, shapes, strict=True):
+        for (e, b, part), f in zip(slots, functions_at, strict=True):
             raw = np.zeros((e.count, f.shape[1]))
             raw[part] = f
             columns.append(b.counted(e.whitened(raw))[part])

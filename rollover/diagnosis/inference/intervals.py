@@ -69,12 +69,12 @@ def shape_variance(problem: Problem, fitted: Fitted, inverse: Array) -> Array:
     """Variances (p,) of what shapes of the last effect that are not fitted would move: each evenly over its range."""
     found = np.zeros(len(fitted.x))
     last, at = fitted.candidates[-1], list(fitted.x)
-    shapes = list(last.shapes)
-    if any(getattr(EFFECTS[last.id](), name, 0.0) is None for name in shapes):
+    secondary = list(last.secondary)
+    if any(getattr(EFFECTS[last.id](), name, 0.0) is None for name in secondary):
         return found  # as the scenario has it
-    begun = last.with_secondary(())[0] if shapes else ()
+    begun = last.with_secondary(())[0] if secondary else ()
     whole = (*fitted.candidates[:-1], last.whole())
-    for k in range(len(shapes)):
+    for k in range(len(secondary)):
         pull = np.zeros(len(fitted.x))
         low, high = (min(max(begun[k] + s * EVENLY, 0.0), 1.0) for s in (-1.0, 1.0))
         ends = [(whole, [*at, *begun[:k], v, *begun[k + 1 :]]) for v in (low, high)]
@@ -94,11 +94,13 @@ def with_secondary(problem: Problem, fitted: Fitted) -> tuple[Fitted, Array, lis
     usually not there is left out, and where a look costs a run all are: see `shape_variance`.
     """
     candidates, x, primary, prior = [], list[float](), list[int](), list[float]()
-    for c, place in with_slices(fitted.candidates):
-        own = fitted.x[place]
+    for c, columns in with_slices(fitted.candidates):
+        own = fitted.x[columns]
         primary += range(len(x), len(x) + len(own))
-        usual = {name: getattr(EFFECTS[c.id](), name) for name in c.shapes}
-        estimated = all(v is not None and c.shapes[name].low <= v <= c.shapes[name].high for name, v in usual.items())
+        usual = {name: getattr(EFFECTS[c.id](), name) for name in c.secondary}
+        estimated = all(
+            v is not None and c.secondary[name].low <= v <= c.secondary[name].high for name, v in usual.items()
+        )
         whole = c.with_secondary(own)[0] if estimated and usual else own
         prior += [GENTLE] * len(own) + [EVENLY**-2] * (len(whole) - len(own))
         x += whole
@@ -108,7 +110,7 @@ def with_secondary(problem: Problem, fitted: Fitted) -> tuple[Fitted, Array, lis
         if found is not None:
             return found, np.array(prior), primary
     # of a parameter of a narrow effect recordings may tell nothing at all: it lies evenly in its range
-    own_prior = [EVENLY**-2 if c.is_narrow else GENTLE for c in fitted.candidates for _ in c.search]
+    own_prior = [EVENLY**-2 if c.is_local else GENTLE for c in fitted.candidates for _ in c.search]
     return fitted, np.array(own_prior), list(range(len(fitted.x)))
 
 
@@ -191,7 +193,7 @@ def _along_ridge(
     """
     (start, due), far = rise, begun
     x, shifts = [v for j, v in enumerate(fitted.x) if j != k], [b.shift for b in fitted.blocks]
-    if any(len(c.search) == 1 for c, place in with_slices(fitted.candidates) if place.start <= k < place.stop):
+    if any(len(c.search) == 1 for c, columns in with_slices(fitted.candidates) if columns.start <= k < columns.stop):
         return far
     inside, beyond = (far, due), far
     for _ in range(TUNING.ridge_steps):
@@ -212,8 +214,10 @@ def _along_ridge(
 
 def held_at(fitted: Fitted, k: int, at: float) -> list[Candidate]:
     """The effects of a fit with its k-th coordinate held at a place."""
-    c, place = next((c, place) for c, place in with_slices(fitted.candidates) if place.start <= k < place.stop)
-    name = list(c.search)[k - place.start]
+    c, columns = next(
+        (c, columns) for c, columns in with_slices(fitted.candidates) if columns.start <= k < columns.stop
+    )
+    name = list(c.search)[k - columns.start]
     rest = {n: s for n, s in c.search.items() if n != name}
     held = replace(c, search=rest, fixed={**c.fixed, name: physical(at, c.search[name])})
     return [held if one is c else one for one in fitted.candidates]
@@ -253,8 +257,8 @@ def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: 
     found = np.full((own.size, 2), np.nan)
     for k, way in enumerate(_ways(fitted, own)):
 
-        def runs(places: Sequence[float], way: Array = way) -> list[Sequence[ResidualBlock] | None]:
-            points = [np.array(fitted.x) + t * way for t in places]
+        def runs(multiples: Sequence[float], way: Array = way) -> list[Sequence[ResidualBlock] | None]:
+            points = [np.array(fitted.x) + t * way for t in multiples]
             inside = [bool(np.all((x >= 0.0) & (x <= 1.0))) for x in points]
             problem.made_ahead(
                 (r, fitted.candidates, [float(v) for v in x])
@@ -262,7 +266,8 @@ def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: 
                 for r in range(len(fitted.blocks) if there else 0)
             )
             met = [
-                _clocked(problem, fitted, t * way) if there else None for t, there in zip(places, inside, strict=True)
+                _clocked(problem, fitted, t * way) if there else None
+                for t, there in zip(multiples, inside, strict=True)
             ]
             return [None if f is None else f.blocks for f in met]
 
@@ -379,7 +384,7 @@ def intervals(
             values = {
                 name: with_full_scale(one, full_scale_of(problem.dataset, c.channel)) for name, one in values.items()
             }
-        values |= {n: Interval(value=v, low=v, high=v, unit=units.get(n, "")) for n, v in c.form.items()}
+        values |= {n: Interval(value=v, low=v, high=v, unit=units.get(n, "")) for n, v in c.variant.items()}
         found.append(values)
     return found
 

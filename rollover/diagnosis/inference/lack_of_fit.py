@@ -130,7 +130,7 @@ def mismatch_of(
     p = min(_p_value(telling, len(blocks)), outlier_p_value(np.concatenate(w) for w in by_channel.values()))
     sent = p_value_of_divergence(sum(other), len(other))
     p = (
-        min(p, sent) if sent <= SETTINGS.noise.ensemble.other_course_p_value else p
+        min(p, sent) if sent <= SETTINGS.noise.ensemble.divergence_p_value else p
     )  # one may, not all of them: whole numbers, and no p-value until they tell
     return Mismatch(cells=tuple(cells), telling=tuple(telling), p_value=p, adjusted=_holm([c.p_value for c in cells]))
 

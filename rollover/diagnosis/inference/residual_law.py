@@ -157,8 +157,8 @@ def _candidate(subset: Subset, depth: float, speed: float) -> tuple[Candidate, l
     fixed: dict[str, Any] = {part: names[t] for part, t in zip(PARTS, subset.terms, strict=False)}
     search, x = {}, []
     for part, force in zip(PARTS, subset.forces, strict=False):
-        reach = TUNING.search_width * abs(float(force)) + 0.3 * largest
-        search[f"{part}_force"] = Search(float(force) - reach, float(force) + reach)
+        half_width = TUNING.search_width * abs(float(force)) + 0.3 * largest
+        search[f"{part}_force"] = Search(float(force) - half_width, float(force) + half_width)
         x.append(coordinate(float(force), search[f"{part}_force"]))
     family = Empirical.family
     fixed |= {"depth": depth, "speed": speed}

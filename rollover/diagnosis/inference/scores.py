@@ -12,7 +12,7 @@ from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Held, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, time_shift_step
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.result import Score
 from rollover.diagnosis.settings import SETTINGS
 
@@ -42,7 +42,7 @@ def judged(problem: Problem, fitted: Fitted, validation: Sequence[Dataset], grou
         scores = {"training": train, "held_out": replace(train, nrmse=held.total)}
         return Judged(scores=scores, held=held, by_recording=tuple(rows))
     other = Problem(validation)
-    align(other)
+    estimate_time_shifts(other)
     apart = predicted(other, fitted)
     if apart is None:
         return Judged(scores={"training": train}, held=held, by_recording=tuple(rows))

@@ -187,7 +187,7 @@ def slow_noise_margin(memory: float, count: float) -> float:
 
 def is_bursting(s: Signal, misfit: Array, level: float) -> bool:
     """Whether a misfit (n,) is much less beside its bursts; digits that jump are none."""
-    return s.step == 0.0 and level > SETTINGS.noise.outliers.burst_ratio * float(
+    return s.step == 0.0 and level > SETTINGS.noise.outliers.outlier_ratio * float(
         np.sqrt(np.mean(without_outliers(misfit) ** 2))
     )
 
@@ -338,7 +338,7 @@ def _quieter(misfits: Sequence[Array], own: Sequence[Array]) -> NoiseFloor | Non
     best, other = _floor(misfits), _floor(own)
     best = other if other.sigma < SETTINGS.data.dataset.own_noise_below * best.sigma else best
     beside = _floor([without_outliers(v) for v in misfits])
-    return beside if 0.0 < SETTINGS.noise.outliers.burst_ratio * beside.sigma < best.sigma else best
+    return beside if 0.0 < SETTINGS.noise.outliers.outlier_ratio * beside.sigma < best.sigma else best
 
 
 def _floor(values: Sequence[Array]) -> NoiseFloor:

@@ -138,7 +138,7 @@ def leave_one_out_neighbours(e: Dataset) -> Array:
         others = [d for j, d in enumerate(e.perturbed) if j != k]
         alone = tuple(
             _weighted(e, replace(s, weight=None), np.stack([d[part] for d in others]))
-            if len(others) >= TUNING.least_neighbours
+            if len(others) >= TUNING.least_perturbed
             else s
             for s, part in e.spans()
         )
@@ -191,11 +191,11 @@ def gained(less: Array, slope: float) -> Array:
 
 def has_diverged(found: HeavyTail | None) -> bool:
     """Whether a recording diverges clearly from its run after an impact."""
-    return found is not None and found.share < TUNING.other_course
+    return found is not None and found.share < TUNING.diverged_share
 
 
 def p_value_of_divergence(others: int, of: int) -> float:
-    """p-value of so many recordings that diverge, where each may in `other_course_rate` of all cases."""
+    """p-value of so many recordings that diverge, where each may in `divergence_rate` of all cases."""
     from scipy.special import bdtrc
 
-    return float(bdtrc(others - 1, of, TUNING.other_course_rate)) if others else 1.0
+    return float(bdtrc(others - 1, of, TUNING.divergence_rate)) if others else 1.0

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rollover.diagnosis import io
-from rollover.diagnosis.conclusion import TUNING, Asked, weighed
+from rollover.diagnosis.conclusion import TUNING, Asked, conclusion_of
 from rollover.diagnosis.data.dataset import left_out
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit.jobs import Executor
@@ -86,7 +86,7 @@ def _diagnosed(model: ForwardModel, asked: Asked, tolerance: float) -> Diagnosis
         say=asked.say,
         executor=executor,
     )
-    concluded = weighed(asked, inquiry, base, kept, acts="model", notes=notes)
+    concluded = conclusion_of(asked, inquiry, base, kept, acts="model", notes=notes)
     fitted = concluded.explanation.fitted
     if not model.parameters:
         return reported(concluded)

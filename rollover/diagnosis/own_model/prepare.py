@@ -97,7 +97,7 @@ def begun(model: ForwardModel, problem: Problem) -> Fitted | None:
         best = again
     alone = [problem.fit(baseline, best.x, only=[r]) for r in range(len(problem.dataset))]
     met = min((f for f in alone if f is not None), key=lambda f: f.left / f.blocks[0].residual.size, default=best)
-    placed = replace(baseline[0], places=tuple(dict.fromkeys([start, met.x])))
+    placed = replace(baseline[0], points=tuple(dict.fromkeys([start, met.x])))
     return ended(problem, problem.again(replace(best, candidates=(placed,))))
 
 

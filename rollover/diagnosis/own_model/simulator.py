@@ -19,7 +19,7 @@ from rollover.system.errors import Fault
 
 Array = NDArray[np.float64]
 PREFIX = "effects."
-KEPT = SETTINGS.forward.drop.kept_predictions
+CACHED = SETTINGS.forward.drop.cached_predictions
 PART = SETTINGS.forward.model_part
 
 
@@ -65,7 +65,7 @@ class ModelSimulator:
         """Outputs before sensors with values exchanged; None where there is no solution. Raises `FailedModelError`."""
         key = tuple(sorted(values.items()))
         if key not in self._runs:
-            if len(self._runs) >= KEPT:
+            if len(self._runs) >= CACHED:
                 self._runs.pop(next(iter(self._runs)))
             self._runs[key] = self.called(values)
         return self._runs[key]

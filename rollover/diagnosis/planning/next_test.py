@@ -110,7 +110,7 @@ def advice(grid: Grid, one: Placed, other: Placed, probability: float) -> Advice
     known = EFFECTS[a.id].rivals.get(b.id) or EFFECTS[b.id].rivals.get(a.id) or ""
     tried: list[NextTest] = []
     if probability >= TUNING.told_apart:
-        return _told((a.key, b.key), probability, None, tried, known)
+        return _advice((a.key, b.key), probability, None, tried, known)
     for level in grid.levels():
         for instruments in level:
             for value in grid.values():
@@ -123,7 +123,7 @@ def advice(grid: Grid, one: Placed, other: Placed, probability: float) -> Advice
         best = cheapest(tried)
         if best is not None and best.probability >= TUNING.told_apart:
             break
-    return _told((a.key, b.key), probability, cheapest(tried), tried, known)
+    return _advice((a.key, b.key), probability, cheapest(tried), tried, known)
 
 
 def chance_of(dataset: Sequence[Dataset], one: Placed, other: Placed) -> float:
@@ -134,7 +134,7 @@ def chance_of(dataset: Sequence[Dataset], one: Placed, other: Placed) -> float:
     return sum(known) / len(known) if known else 0.5
 
 
-def _told(
+def _advice(
     effects: tuple[str, str], probability: float, best: NextTest | None, tried: Sequence[NextTest], known: Any
 ) -> Advice:
     is_enough = max(probability, 0.0 if best is None else best.probability) >= TUNING.told_apart

@@ -13,7 +13,14 @@ from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.planning.next_test import Advice, Grid, advice, varied
 from rollover.diagnosis.planning.planned import Instruments, planned
 from rollover.diagnosis.planning.separation import Apart, Tests
-from rollover.diagnosis.planning.strength import detection, needed, of_one, place_where_it_acts, strength_with, usual
+from rollover.diagnosis.planning.strength import (
+    detection,
+    of_one,
+    point_where_it_acts,
+    required_noncentrality,
+    strength_with,
+    usual,
+)
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import COLUMNS, unfit
@@ -123,14 +130,14 @@ def plan(
     every = candidates_of(dataset, scenario.effects, "drop", scenario, size_of(set_up(scenario, dataset[0].recording)))
     chosen = _chosen(every, between)
     size = of_one(TUNING.false_alarm, len(every))
-    enough = needed(TUNING.power, size)
+    enough = required_noncentrality(TUNING.power, size)
     say(f"{len(chosen)} effects in {len(dataset)} drops")
     effects, judged = [], {}
     for c in chosen:
-        found, place = _detectable(tests, c, size, enough)
+        found, point = _detectable(tests, c, size, enough)
         effects.append(found)
-        if place is not None:
-            judged[c.key] = (c, place)
+        if point is not None:
+            judged[c.key] = (c, point)
     asked = between or [(a, b) for a in judged for b in judged if a < b]
     wanted = dict.fromkeys(pair for a, b in asked for pair in ((a, b), (b, a)))
     say(f"{len(wanted)} pairs")
@@ -208,7 +215,7 @@ def _detectable(tests: Tests, c: Candidate, size: float, enough: float) -> tuple
 
     name, _ = null_of(c)
     own, unit = usual(c), units_of(EFFECTS[c.id], c.channel)[name]
-    at = place_where_it_acts(c, shows)
+    at = point_where_it_acts(c, shows)
     least = None if at is None else strength_with(c, at, shows, enough)
     judged = None if at is None or least is None else strength_with(c, least, shows, TUNING.clearly * enough) or least
     values = {} if judged is None else c.values(judged)

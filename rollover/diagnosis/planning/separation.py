@@ -96,7 +96,7 @@ class Tests:
             least = min([far, *(left for left, _ in nearest)])
             x_rival = nearest[0][1] if nearest else ()
         else:
-            fits = [shown.fit((rival,), place, rounds=TUNING.rounds, width=1) for _, place in nearest[: TUNING.starts]]
+            fits = [shown.fit((rival,), point, rounds=TUNING.rounds, width=1) for _, point in nearest[: TUNING.starts]]
             best = min((f for f in fits if f is not None), key=lambda f: f.total, default=None)
             if best is not None:  # noise-free, a search ends where a round gains less than noise would hide: too early
                 ended = shown.fit((rival,), best.x, rounds=TUNING.rounds, finely=True)
@@ -110,15 +110,15 @@ class Tests:
         if d is None:
             return []
         found = []
-        for place in dict.fromkeys([*rival.starts(), *rival.probes()]):
-            s = self.moved(rival, place)
+        for point in dict.fromkeys([*rival.starts(), *rival.scan_points()]):
+            s = self.moved(rival, point)
             size = 0.0 if s is None else float(s @ s)
             if s is None or size <= 0.0:
                 continue
             along = float(d @ s) / size
-            there = scaled(rival, place, along)
+            there = scaled(rival, point, along)
             if there is None:  # nothing to scale from: the place itself
-                found.append((float((d - s) @ (d - s)), place))
+                found.append((float((d - s) @ (d - s)), point))
             else:
                 found.append((float(d @ d) - along**2 * size, there))
         return sorted(found)

@@ -31,11 +31,11 @@ from rollover.effects import EFFECTS, units_of
 from rollover.effects.effect import CHANNELS_OWN
 
 TUNING = SETTINGS.planning
-Place = tuple[float, ...]
-Shows = Callable[[Place], float]
+Coordinates = tuple[float, ...]
+Shows = Callable[[Coordinates], float]
 
 
-def usual(c: Candidate) -> Place | None:
+def usual(c: Candidate) -> Coordinates | None:
     """Coordinates of an effect as strong as it usually is; None where that depends on the channel alone."""
     kind: Any = EFFECTS[c.id]
     own = kind() if c.channel is None else kind(channel=c.channel)
@@ -47,7 +47,7 @@ def usual(c: Candidate) -> Place | None:
     return coordinates(values, c.search)
 
 
-def scaled(c: Candidate, x: Place, factor: float) -> Place | None:
+def scaled(c: Candidate, x: Coordinates, factor: float) -> Coordinates | None:
     """`followed`, and the same of what has the scenario's own value for its zero; None where no value is known."""
     name, zero = null_of(c)
     if zero is None or EFFECTS[c.id].null.get(name) is not None:
@@ -58,14 +58,14 @@ def scaled(c: Candidate, x: Place, factor: float) -> Place | None:
     return (*x[:at], inside, *x[at + 1 :])
 
 
-def place_where_it_acts(c: Candidate, shows: Shows) -> Place | None:
+def point_where_it_acts(c: Candidate, shows: Shows) -> Coordinates | None:
     """Its usual place, or the first of its starts that does anything in a test; None where none does."""
     own = usual(c)
-    places = [*([] if own is None else [own]), *c.starts(), *c.probes()]
-    return next((x for x in places if shows(x) > TUNING.nothing), None)
+    points = [*([] if own is None else [own]), *c.starts(), *c.scan_points()]
+    return next((x for x in points if shows(x) > TUNING.nothing), None)
 
 
-def strength_with(c: Candidate, at: Place, shows: Shows, noncentrality: float) -> Place | None:
+def strength_with(c: Candidate, at: Coordinates, shows: Shows, noncentrality: float) -> Coordinates | None:
     """Coordinates of the effect that has this noncentrality, from a place where it acts; None: its range ends before.
 
     What has a zero is made weaker or stronger by the root of what is asked for; of a limit the value itself is sought.
@@ -87,7 +87,7 @@ def strength_with(c: Candidate, at: Place, shows: Shows, noncentrality: float) -
     return x if shows(x) > noncentrality * (1.0 - TUNING.close) else None
 
 
-def _limit_with(c: Candidate, at: Place, shows: Shows, noncentrality: float) -> Place | None:
+def _limit_with(c: Candidate, at: Coordinates, shows: Shows, noncentrality: float) -> Coordinates | None:
     """The same for a limit, by halving: the lower, the stronger; others as at one of their starts that shows enough."""
     if not is_limit(c):
         return min((x for x in [at, *c.starts()] if shows(x) >= noncentrality), key=shows, default=None)
@@ -112,7 +112,7 @@ def detection(noncentrality: float, size: float, freedoms: int = 1) -> float:
     return float(ncx2.sf(chi2.isf(size, freedoms), freedoms, noncentrality)) if noncentrality > 0.0 else size
 
 
-def needed(power: float, size: float, freedoms: int = 1) -> float:
+def required_noncentrality(power: float, size: float, freedoms: int = 1) -> float:
     """Noncentrality at which (P1) is `power`; 0 where that is no more than the size."""
     from scipy.optimize import brentq
 

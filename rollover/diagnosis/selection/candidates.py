@@ -64,7 +64,7 @@ def candidates_of(
         null = None if acts == "drop" else tuple(unlike.get(p) for p in search)
         held = {p: physical(x, search[p]) for p, x in unlike.items() if x is not None and kind.null.get(p) is None}
         found.append(
-            Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes, null=null, own=held)
+            Candidate(id=name, kind=kind.kind, family=kind.family, search=search, secondary=shapes, null=null, own=held)
         )
     return found
 
@@ -85,7 +85,7 @@ def of_sensors(dataset: Sequence[Dataset]) -> list[Candidate]:
             kind=kind.kind,
             family=kind.family,
             search={p: s for p, s in ranges.items() if p not in kind.shapes},
-            shapes={p: s for p, s in ranges.items() if p in kind.shapes},
+            secondary={p: s for p, s in ranges.items() if p in kind.shapes},
             channel=of.channel,
         )
         for name, kind in EFFECTS.items()

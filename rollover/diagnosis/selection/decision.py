@@ -61,15 +61,15 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         base=base,
         fitted=current,
         parts=tuple(parts),
-        looked=found.at_first,
-        detectable={**found.at_first.detectable, **found.looked.detectable},
+        scored=found.at_first,
+        detectable={**found.at_first.detectable, **found.scored.detectable},
         before=found.before,
         after=mismatch_of(problem.dataset, current.blocks, phases),
         first=None
         if found.first is None
         else found.first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map),
         refuted=found.refuted,
-        settled=retained is not None,
+        is_unique=retained is not None,
     )
 
 
@@ -83,8 +83,8 @@ def may_be_named(problem: Problem, fitted: Fitted, left: Mismatch) -> bool:
 
 
 def _fully_fitted_steps(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
-    """Steps of the effects that are needed, as `_needed_steps`, the last one's fit followed to its end."""
-    retained = _needed_steps(inquiry, taken)
+    """Steps of the effects that are needed, as `_retained_steps`, the last one's fit followed to its end."""
+    retained = _retained_steps(inquiry, taken)
     return None if retained is None else _one_each(inquiry, [*retained[:-1], followed(inquiry, retained[-1])[0]])
 
 
@@ -111,7 +111,7 @@ def _one_each(inquiry: Inquiry, steps: Sequence[Step]) -> list[Step]:
     return [*found, known[last.key]]
 
 
-def _needed_steps(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
+def _retained_steps(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
 
     Beside a better one others may not be needed any more. Returned in such an order that the last one's fit is the
@@ -158,8 +158,8 @@ def backward_elimination(problem: Problem, fitted: Fitted, base: Fitted | None =
     """
     while len(fitted.effects) > 1:
         losses: list[tuple[float, int, Fitted | None]] = [(np.inf, -1, None)]
-        surely = significant_by_wald(problem, fitted) if problem.effort.is_ensemble else set()
-        for k in {*range(fitted.first, len(fitted.candidates))} - surely:
+        significant = significant_by_wald(problem, fitted) if problem.effort.is_ensemble else set()
+        for k in {*range(fitted.first, len(fitted.candidates))} - significant:
             rest = _without_kth(problem, fitted, k, base)
             losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
         loss, _, rest = min(losses, key=lambda one: one[0])
@@ -189,7 +189,7 @@ def verdict_on(problem: Problem, found: Explanation, groups: Groups, phases: Pha
     where it takes nearly all.
     """
     held, is_curved = found.fitted.effects, is_a_curve(problem, found.fitted)
-    if not found.settled or is_over_flexible(held) or (is_curved and is_straight_line(held)):
+    if not found.is_unique or is_over_flexible(held) or (is_curved and is_straight_line(held)):
         return found.refused(), "unexplained"
     is_bending = len(found.parts) == MOST_EFFECTS or is_one_sensor(held) or is_flexible_soil(held)
     is_whole = found.after.p_value > (FULL_P_VALUE if is_bending else P_VALUE)
@@ -248,21 +248,21 @@ def redundant_effects(problem: Problem, found: Explanation, ids: Collection[str]
         others = [(o, fitted.x[own]) for j, (o, own) in enumerate(with_slices(fitted.candidates)) if j != k]
         fits = [without_effect(problem, fitted, k)]
         for j, (other, x) in enumerate(others):
-            for place in other.with_secondary(x) if other.shapes else ():
-                way = [*others[:j], (other.whole(), place), *others[j + 1 :]]
+            for point in other.with_secondary(x) if other.secondary else ():
+                way = [*others[:j], (other.whole(), point), *others[j + 1 :]]
                 fits.append(problem.fit([o for o, _ in way], [v for _, at in way for v in at], shifts=shifts))
         if min((f.left for f in fits if f is not None), default=np.inf) - fitted.left < LEAST_GAIN * dispersion:
             done.add(c.id)
     return done
 
 
-def by_first_effect(problem: Problem, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:
-    """The explanation by its first effect alone, where that is none of those that may be `nothing`; else refused.
+def by_first_effect(problem: Problem, found: Explanation, refuted: Collection[str], phases: Phases) -> Explanation:
+    """The explanation by its first effect alone, where that is none of those that may be `refuted`; else refused.
 
     Of one that was all there is, its gain is refuted with it.
     """
     one = found.first
-    if one is None or one.fitted.candidates[-1].id in nothing:
+    if one is None or one.fitted.candidates[-1].id in refuted:
         return replace(found.refused(), refuted=found.refuted or len(found.parts) == 1)
     one = one.again(problem)
     one, after = with_conditions_refitted(problem, one, mismatch_of(problem.dataset, one.fitted.blocks, phases), phases)

@@ -45,7 +45,7 @@ def with_full_weights(problem: Problem, fitted: Fitted) -> Fitted:
     found = problem.again(fitted)
     if (
         p_value_of_divergence(sum(has_diverged(b.heavy_tail) for b in found.blocks), len(found.blocks))
-        > SETTINGS.noise.ensemble.other_course_p_value
+        > SETTINGS.noise.ensemble.divergence_p_value
     ):
         return found
     problem.heavy_tailed = False
@@ -62,14 +62,14 @@ def counted_in_full(problem: Problem, base: Fitted) -> Fitted:
     return found
 
 
-def without_unsupported_rivals(found: Step, looked: ScoreTest, spoken: float = TUNING.own_p_value) -> Step:
+def without_unsupported_rivals(found: Step, scored: ScoreTest, spoken: float = TUNING.own_p_value) -> Step:
     """A step without rivals that nothing spoke for when looked at, by a p-value: their runs met them by chance.
 
     What speaks for one that acts somewhere speaks for its family; for a strong one its runs did.
     """
     last = [f.candidates[-1] for f in found.rivals]
     spoken_for = [
-        c for c in last if c.key in looked.far or p_value(looked.scores.get(c.key, 0.0), looked.null) < spoken
+        c for c in last if c.key in scored.far or p_value(scored.scores.get(c.key, 0.0), scored.null) < spoken
     ]
     kept = [*spoken_for, *same_family(last, spoken_for)]
     return replace(found, rivals=tuple(f for f in found.rivals if f.candidates[-1] in kept))
@@ -144,7 +144,7 @@ def is_there(problem: Problem, fitted: Fitted) -> bool:
 def significant_by_wald(problem: Problem, fitted: Fitted) -> set[int]:
     """Places of the effects that no run is needed to tell that something would be missing without: by slopes alone."""
     each = zip(map(_nulls, fitted.candidates), intervals(problem, fitted, {}), strict=True)
-    return {k for k, (nulls, by_slopes) in enumerate(each) if _is_apart(by_slopes, nulls, TUNING.needed_width)}
+    return {k for k, (nulls, by_slopes) in enumerate(each) if _is_apart(by_slopes, nulls, TUNING.retained_width)}
 
 
 def _nulls(c: Candidate) -> dict[str, float]:

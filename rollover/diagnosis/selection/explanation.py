@@ -32,20 +32,20 @@ class Explanation:
     """What was selected: the base, the fit (the base itself if nothing), a step for each of its effects.
 
     Each step's base is the fit without that effect, so that its rivals competed beside all the others. `first` is the
-    first step, taken or not; `looked` what all candidates scored beside the base; `detectable` the strength at which
+    first step, taken or not; `scored` what all candidates scored beside the base; `detectable` the strength at which
     each would have shown, beside the explanation for those that are not in it.
     """
 
     base: Fitted
     fitted: Fitted
     parts: tuple[Step, ...]
-    looked: ScoreTest
+    scored: ScoreTest
     detectable: Mapping[str, float]
     before: Mismatch
     after: Mismatch
     first: Step | None = None
     refuted: bool = False  # whether the best candidate's gain did not outlast the scatter of its own runs
-    settled: bool = True  # whether as many effects as may be are these, and not any that can be bent to what is there
+    is_unique: bool = True  # whether as many effects as may be are these, and not any that can be bent to what is there
 
     def refused(self) -> Explanation:
         """The same with nothing held to be found."""
@@ -61,8 +61,8 @@ class Explanation:
         """
         if self.refuted:
             return self.before.p_value
-        share = TUNING.look_share if any(b.expected is not None for b in self.base.blocks) else 0.5
-        tests = ((self.before.p_value, 1.0 - share), (self.looked.p_value(), share))
+        share = TUNING.scan_share if any(b.expected is not None for b in self.base.blocks) else 0.5
+        tests = ((self.before.p_value, 1.0 - share), (self.scored.p_value(), share))
         return float(min(-np.expm1(np.log1p(-min(p, TUNING.largest_p_value)) / a) for p, a in tests))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.phases import Phases
 from rollover.diagnosis.fit.cross_validation import Groups, cross_validated_by_refits, held_out, held_out_disadvantage
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, ends_at_bound
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, is_at_bound
 from rollover.diagnosis.fit.local_search import completed_shifts
 from rollover.diagnosis.fit.step import Inquiry, Screened, Step
 from rollover.diagnosis.fit.tasks import Task
@@ -21,7 +21,7 @@ from rollover.diagnosis.selection.restarts import (
     best_of_each,
     continued_from,
     from_other_starts,
-    with_shapes,
+    with_secondary_parameters,
     with_time_shifts,
 )
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value
@@ -40,10 +40,10 @@ Array = NDArray[np.float64]
 TUNING = SETTINGS.selection.forward_step
 
 
-def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
+def step(inquiry: Inquiry, base: Fitted, scored: ScoreTest) -> Step | None:
     """Fit the promising candidates beside the base and rank them by what they predict of held-out conditions.
 
-    `looked` is what all of them scored beside the base. Where the best leaves nearly noise, that noise is weighed by
+    `scored` is what all of them scored beside the base. Where the best leaves nearly noise, that noise is weighed by
     what it leaves; the step is then under that noise. None if nothing could be fitted.
     """
     problem, groups, candidates = inquiry.problem, inquiry.groups, inquiry.free(base)
@@ -56,9 +56,9 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
     )
     who, start = problem.beginning(base)
     early = replace(inquiry, problem=who)
-    screened = screen(early, start, promising(candidates, looked, problem.effort), few, shifts, looked)
+    screened = screen(early, start, promising(candidates, scored, problem.effort), few, shifts, scored)
     count = sum(b.residual.size for b in base.blocks)
-    screened, begun_with = _first_fits(early, start, screened, few, shifts, looked)
+    screened, begun_with = _first_fits(early, start, screened, few, shifts, scored)
     reused = reusable_slopes(problem, base)
     tasks = [
         Task(candidates=f.candidates, start=f.x, shifts=completed_shifts(shifts, f, few), width=1, reused=reused)
@@ -68,10 +68,10 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
     if not fits:
         return None
     if base.candidates and not problem.effort.is_ensemble:
-        fits += _restarted_from_base(inquiry, base, fits, looked)
+        fits += _restarted_from_base(inquiry, base, fits, scored)
     fits.sort(key=lambda f: f.left)
     if not problem.effort.is_ensemble:
-        fits = from_other_starts(inquiry, base, fits, looked, shifts)
+        fits = from_other_starts(inquiry, base, fits, scored, shifts)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
     able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < TUNING.polished_misfit * fits[0].left]
     alone = [f for f in able[:1] if f is fits[0] and not base.effects]
@@ -84,7 +84,11 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
         polished = inquiry.fits([continued_from(f, "polish") for f in near])
         others = [f for f in fits if not any(f is one for one in near)]
         fits = others + [new or old for new, old in zip(polished, near, strict=True)]
-    fits = best_of_each(fits) if problem.effort.is_ensemble else with_shapes(inquiry, base, best_of_each(fits))
+    fits = (
+        best_of_each(fits)
+        if problem.effort.is_ensemble
+        else with_secondary_parameters(inquiry, base, best_of_each(fits))
+    )
     if not problem.effort.is_ensemble:
         fits = with_time_shifts(inquiry, base, fits)
     if with_noise_of_fit(problem, fits[0], inquiry.phases):
@@ -93,20 +97,20 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
         fits = _refitted_where_slopes_mislead(inquiry, fits)
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     fits = simplest(fits, groups, problem.samples_per_error)
-    p = by_chance(base, fits, looked, problem.samples_per_error)
+    p = by_chance(base, fits, scored, problem.samples_per_error)
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
 
 
-def by_chance(base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shared: float) -> float:
+def by_chance(base: Fitted, fits: Sequence[Fitted], scored: ScoreTest, shared: float) -> float:
     """p-value of what the best of all fits gains, where `shared` samples have one error."""
     least = min(f.left for f in fits)
     # what even the best leaves is no chance of the noise's size
     dispersion = max(1.0, least / sum(b.residual.size for b in base.blocks))
-    score = looked.score
+    score = scored.score
     if shared > 1.0:
         # beside a tolerance what is missing is large, and a fit finds more of it than its slope where it is not
         dispersion, score = dispersion * shared, max(score, base.left - least)
-    return p_value(score / dispersion, looked.null)
+    return p_value(score / dispersion, scored.null)
 
 
 def reusable_slopes(problem: Problem, base: Fitted, few: Sequence[int] | None = None) -> tuple[Array, ...] | None:
@@ -128,7 +132,7 @@ def _refitted_where_slopes_mislead(inquiry: Inquiry, fits: Sequence[Fitted]) -> 
     return [new if f is lead else f for f in fits]
 
 
-def _restarted_from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest) -> list[Fitted]:
+def _restarted_from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], scored: ScoreTest) -> list[Fitted]:
     """Fits anew, from the base itself, of candidates that were led astray: beside them more is left than without.
 
     Those that soon gain a part of what the best does are gone on with.
@@ -136,7 +140,7 @@ def _restarted_from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted],
     tasks, least, shifts = [], min(f.left for f in fits), tuple(b.shift for b in base.blocks)
     for f in fits:
         if f.left > base.left:
-            begin = looked.starts.get(f.candidates[-1].key, (f.own,))[0]
+            begin = scored.starts.get(f.candidates[-1].key, (f.own,))[0]
             tasks.append(
                 Task(candidates=f.candidates, start=(*base.x, *begin), shifts=shifts, rounds=TUNING.short_rounds)
             )
@@ -170,11 +174,11 @@ def _first_fits(
     screened: Sequence[Screened],
     few: Sequence[int],
     shifts: Sequence[float],
-    looked: ScoreTest,
+    scored: ScoreTest,
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
     problem = inquiry.problem
-    chosen = {s.candidate.key: s for s in _chosen(screened, problem.effort, looked)}
+    chosen = {s.candidate.key: s for s in _chosen(screened, problem.effort, scored)}
     nrmse_by_key: dict[str, float] = {}
     inquiry.say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
@@ -188,7 +192,7 @@ def _first_fits(
         for start in s.starts
         for x in (base.x, *_elsewhere_of(base))
     ]  # fmt: skip
-    far = [] if problem.heavy_tailed else [task for task in tasks if task.candidates[-1].key in looked.far]
+    far = [] if problem.heavy_tailed else [task for task in tasks if task.candidates[-1].key in scored.far]
     fits = [f for f in inquiry.fits([task for task in tasks if task not in far]) if f is not None]
     fits += _robust_short_fits(inquiry, far, few)
     for one in fits:
@@ -207,12 +211,12 @@ def _first_fits(
             f
             for f in worth
             if as_it_is - f.left >= TUNING.rival_share * (as_it_is - fits[0].left)
-            or f.candidates[-1].key == looked.best
+            or f.candidates[-1].key == scored.best
         ]
     worth = worth[: problem.effort.most_leaders]
     # a first fit may lead astray what scored most
-    if all(f.candidates[-1].key != looked.best for f in worth):
-        worth += [f for f in fits if f.candidates[-1].key == looked.best][:1]
+    if all(f.candidates[-1].key != scored.best for f in worth):
+        worth += [f for f in fits if f.candidates[-1].key == scored.best][:1]
     return [replace(s, nrmse=nrmse_by_key.get(s.candidate.key, 0.0)) for s in screened], worth
 
 
@@ -222,7 +226,7 @@ def _elsewhere_of(base: Fitted) -> list[tuple[float, ...]]:
     Fitted alone it was bent to what is missing, and from there no way may lead back.
     """
     held, effects = (sum(len(c.search) for c in part) for part in (base.candidates[: base.first], base.effects))
-    return [(*at, *base.x[len(base.x) - effects :]) for c in base.candidates[: base.first] for at in c.places if held]
+    return [(*at, *base.x[len(base.x) - effects :]) for c in base.candidates[: base.first] for at in c.points if held]
 
 
 def _robust_short_fits(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[int]) -> list[Fitted]:
@@ -240,7 +244,7 @@ def _robust_short_fits(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[in
     return [f for f in found if len(f.blocks) == len(few)]
 
 
-def _chosen(screened: Sequence[Screened], effort: Effort, looked: ScoreTest) -> list[Screened]:
+def _chosen(screened: Sequence[Screened], effort: Effort, scored: ScoreTest) -> list[Screened]:
     """Those worth a first fit: that start well, and that have most to gain.
 
     Of runs that scatter those whose score is a small part of the best one's are not; what a sensor makes of them costs
@@ -251,20 +255,20 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: ScoreTest) -> 
     if not effort.is_ensemble:
         return [*by_start, *sorted(screened, key=lambda s: -s.potential)[: effort.promising]]
     by_key = {s.candidate.key: s for s in screened}
-    ranked = [by_key[c.key] for c in looked.ranked([s.candidate for s in screened])]
+    ranked = [by_key[c.key] for c in scored.ranked([s.candidate for s in screened])]
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
     reading = [s for s in ranked if s.candidate.kind == "sensor"]
     related = of_same_family([s.candidate for s in moving], effort.promising, effort.leaders)
 
     def score(s: Screened) -> float:
-        return looked.scores.get(s.candidate.key, 0.0)
+        return scored.scores.get(s.candidate.key, 0.0)
 
     able = []
     for own in (moving, reading):
         least = TUNING.least_score * max(map(score, own), default=0.0)
         begun_well = [s for s in by_start if s in own]
         able += [
-            s for s in (*begun_well, *own[: effort.promising]) if score(s) >= least or s.candidate.key in looked.leading
+            s for s in (*begun_well, *own[: effort.promising]) if score(s) >= least or s.candidate.key in scored.leading
         ]
     return [*able, *(s for s in moving if s.candidate in related)]
 
@@ -330,7 +334,7 @@ def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitt
     return [first, *(f for f in fits if f is not first)]
 
 
-def confusion(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
+def confusion_set(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
     """Rivals that predict held-out recordings as well as the best does, the best first.
 
     And those of no more numbers that meet all recordings as well as it does: what hangs on a single one is hard to
@@ -343,7 +347,7 @@ def confusion(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
         explains = base.left - rival.left > 0.5 * (base.left - best.left)
         as_well = len(rival.x) <= len(best.x) and rival.left < best.left + TUNING.excluded_errors**2
         becomes_best = (
-            len(rival.x) > len(best.x) and rival.left > best.left - TUNING.excluded_errors**2 and ends_at_bound(rival)
+            len(rival.x) > len(best.x) and rival.left > best.left - TUNING.excluded_errors**2 and is_at_bound(rival)
         )
         if rival is best or becomes_best or not explains:
             continue

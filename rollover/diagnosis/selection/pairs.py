@@ -18,8 +18,8 @@ from rollover.diagnosis.fit.threshold_scan import has_threshold, threshold_range
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, is_enough, mismatch_of
 from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.forward_step import step, with_noise_of_fit
-from rollover.diagnosis.selection.restarts import continued_from, with_shapes
-from rollover.diagnosis.selection.scan import look
+from rollover.diagnosis.selection.restarts import continued_from, with_secondary_parameters
+from rollover.diagnosis.selection.scan import score_candidates
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far
 from rollover.diagnosis.selection.simplification import followed, in_usual_shape, mirror_images, simpler
@@ -32,7 +32,7 @@ Start = tuple[tuple[Candidate, ...], tuple[float, ...]]  # two effects beside a 
 
 
 def best_subsets(
-    inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest, current: Fitted, *, is_whole: bool = False
+    inquiry: Inquiry, taken: Sequence[Step], scored: ScoreTest, current: Fitted, *, is_whole: bool = False
 ) -> tuple[list[Step], Mismatch] | None:
     """The best pair of effects, as steps, and what it leaves, see `best_pair`; None if `current` stays.
 
@@ -41,7 +41,7 @@ def best_subsets(
     under the noise that all of it tells of.
     """
     problem, held = inquiry.problem, inquiry.problem.dataset
-    pair = best_pair(inquiry, taken, looked)
+    pair = best_pair(inquiry, taken, scored)
     if pair is None:
         return None
     found, left = followed(inquiry, pair)
@@ -106,20 +106,22 @@ def with_first_replaced(inquiry: Inquiry, current: Fitted) -> Step | None:
     rest = without_effect(problem, current, current.first)
     if rest is None:
         return None
-    looked = look(problem, rest, inquiry.free(rest), inquiry.groups, parallel_map=inquiry.executor.parallel_map)
-    found = step(inquiry, rest, looked)
+    scored = score_candidates(
+        problem, rest, inquiry.free(rest), inquiry.groups, parallel_map=inquiry.executor.parallel_map
+    )
+    found = step(inquiry, rest, scored)
     held = problem.again(first_effect_last(current))
     if (
         found is None or found.fitted.left > held.left + SETTINGS.selection.ensemble_validation.least_gain
     ):  # on the way back nothing came as far
         rivals = () if found is None else found.rivals
         beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
-        back = Step(base=problem.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
+        back = Step(base=problem.again(rest), fitted=held, p_value=scored.p_value(), rivals=(held, *beside))
         return simpler(inquiry, back) or back
     return found
 
 
-def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Step | None:
+def best_pair(inquiry: Inquiry, taken: Sequence[Step], scored: ScoreTest) -> Step | None:
     """The best pair of the first step's rivals, of what led later, and of what gains most, as a step of its second.
 
     Of two effects neither need come first alone: a third may be like both, and the second may leave much alone. Short
@@ -130,14 +132,14 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
     few, shifts = representative_recordings(lead), tuple(b.shift for b in lead.blocks)
     at, fixed_shifts = tuple(shifts[r] for r in few), is_far(problem, first.base)
     # slopes tell what two do together where these are not far off
-    partners = _partners(inquiry, first, taken, looked, TUNING.scored if fixed_shifts else 0)
+    partners = _partners(inquiry, first, taken, scored, TUNING.scored if fixed_shifts else 0)
     two = itertools.combinations(partners, 2)
     base = first.base
     short: list[Start] = [((*base.candidates, a, b), (*base.x, *x, *y)) for (a, x), (b, y) in two if _may_explain(a, b)]
     short += (
         _with_thresholds_scanned(inquiry, partners, few, shifts, (base.candidates, base.x))
         if fixed_shifts
-        else _pairs_by_slopes(inquiry, base, looked)
+        else _pairs_by_slopes(inquiry, base, scored)
     )
     inquiry.say(f"{len(short)} pairs of effects")
     for rounds, most in TUNING.short_fits:
@@ -160,7 +162,7 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
         tasks = [Task(candidates=p.candidates[:-1], start=p.x[: -len(p.own)], shifts=shifts) for p in ways]
         for pair, alone in zip(ways, inquiry.fits(tasks), strict=True):
             if alone is not None:
-                best = min(best, *with_shapes(inquiry, alone, [pair]), key=lambda f: f.left)
+                best = min(best, *with_secondary_parameters(inquiry, alone, [pair]), key=lambda f: f.left)
     alone = problem.fit(best.candidates[:-1], best.x[: -len(best.own)], shifts=[b.shift for b in best.blocks])
     return None if alone is None else Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
 
@@ -170,10 +172,10 @@ def _may_explain(one: Candidate, other: Candidate) -> bool:
     return one.key != other.key and not is_over_flexible((one, other))
 
 
-def _pairs_by_slopes(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> list[Start]:
+def _pairs_by_slopes(inquiry: Inquiry, base: Fitted, scored: ScoreTest) -> list[Start]:
     """Pairs of candidates that gain most together by their slopes, in their usual shapes, from where these lead."""
     usual = {c.key: c for c in inquiry.candidates}
-    begun = [(usual[key], x, usual[other], y) for (key, x), (other, y) in looked.both]
+    begun = [(usual[key], x, usual[other], y) for (key, x), (other, y) in scored.both]
     return [((*base.candidates, a, b), (*base.x, *x, *y)) for a, x, b, y in begun if _may_explain(a, b)]
 
 
@@ -190,8 +192,8 @@ def _with_thresholds_scanned(
     """
     able = [c for c, _ in partners if has_threshold(c) and not c.has_secondary]
     ways = [(a, x, c) for a, x in partners[: TUNING.leading] for c in able if c.key != a.key]
-    look = partial(threshold_starts, few=tuple(few), shifts=tuple(shifts), base=base)
-    each = zip(ways, inquiry.parallel_map(look, ways), strict=True)
+    starts_of = partial(threshold_starts, few=tuple(few), shifts=tuple(shifts), base=base)
+    each = zip(ways, inquiry.parallel_map(starts_of, ways), strict=True)
     return [((*base[0], a, c), x) for (a, _, c), x in each if x is not None]
 
 
@@ -218,7 +220,7 @@ def _with_secondary_fitted(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fi
         if _is_oscillatory(f)
     ]
     lead = min(pairs, key=lambda f: f.left)
-    near = [f for f in able if f.left < TUNING.same_misfit * lead.left and f.candidates[-1].shapes]
+    near = [f for f in able if f.left < TUNING.same_misfit * lead.left and f.candidates[-1].secondary]
     leaves = tuple(b.total for b in lead.blocks)
     made = inquiry.fits([replace(continued_from(f, "shape"), leaves=leaves) for f in near])
     return [f for f in made if f is not None]
@@ -266,11 +268,11 @@ def _is_oscillatory(pair: Fitted) -> bool:
 
 
 def _partners(
-    inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: ScoreTest, scored: int
+    inquiry: Inquiry, first: Step, taken: Sequence[Step], scored: ScoreTest, count: int
 ) -> list[tuple[Candidate, tuple[float, ...]]]:
     """Who may be one of two, and where its fit begins; what was bent to lead alone also in its usual shape.
 
-    Those that led, and of the others so many that `scored` most at first.
+    Those that led, and of the others the first `count` by their score.
     """
     leading = sorted((inquiry.problem.again(f) for f in first.rivals), key=lambda f: f.left)[: TUNING.leading]
     later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[: TUNING.following]]
@@ -279,8 +281,8 @@ def _partners(
         last = f.candidates[-1]
         found.setdefault((last.key, last.has_secondary), (last, f.own))
     known, varied = {key for key, _ in found}, {key for key, has_secondary in found if has_secondary}
-    ranked = sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
+    ranked = sorted(first.screened, key=lambda s: -scored.scores.get(s.candidate.key, 0.0))
     for k, s in enumerate(ranked):
-        if s.candidate.key in varied or (k < scored and s.candidate.key not in known):
+        if s.candidate.key in varied or (k < count and s.candidate.key not in known):
             found.setdefault((s.candidate.key, s.candidate.has_secondary), (s.candidate, s.starts[0]))
     return list(found.values())

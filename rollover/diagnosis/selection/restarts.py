@@ -34,46 +34,46 @@ FOLLOWED: tuple[How, ...] = ("polish", "time")  # how what rings is gone on with
 
 
 def from_other_starts(
-    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]
+    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], scored: ScoreTest, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first; those that gained little are begun again from other starts and with other shapes."""
     count = sum(b.residual.size for b in base.blocks)
     if fits[0].left > TUNING.rugged_above**2 * count:
-        return _refit_on_few(inquiry, base, _damping_frequency_scan(inquiry, fits, looked, shifts), looked, shifts)
-    return _recheck_promising(inquiry, base, fits, looked, shifts)
+        return _refit_on_few(inquiry, base, _damping_frequency_scan(inquiry, fits, scored, shifts), scored, shifts)
+    return _recheck_promising(inquiry, base, fits, scored, shifts)
 
 
 def _recheck_promising(
-    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]
+    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], scored: ScoreTest, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first, with those whose slopes lead and whose usual shape does not bear them out."""
     gains = {f.candidates[-1].key: base.left - f.left for f in best_of_each(fits)}
-    places = []
-    for c in (c for c in inquiry.free(base) if c.shapes):
-        score = looked.scores.get(c.key, 0.0)
+    points = []
+    for c in (c for c in inquiry.free(base) if c.secondary):
+        score = scored.scores.get(c.key, 0.0)
         if (
-            score > max(TUNING.promised_share * looked.score, SETTINGS.fit.model_variants.least_gain)
+            score > max(TUNING.promised_share * scored.score, SETTINGS.fit.model_variants.least_gain)
             and gains.get(c.key, 0.0) < TUNING.promised_share * score
         ):
-            places.append((c, (*base.x, *looked.starts.get(c.key, c.starts())[0])))
-    return _with_shape_starts(inquiry, base, fits, places, shifts)
+            points.append((c, (*base.x, *scored.starts.get(c.key, c.starts())[0])))
+    return _with_shape_starts(inquiry, base, fits, points, shifts)
 
 
 def _damping_frequency_scan(
-    inquiry: Inquiry, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]
+    inquiry: Inquiry, fits: Sequence[Fitted], scored: ScoreTest, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first, the best that rings begun anew along its damping and its frequency.
 
     It leads by what it leaves, or by its score: its frequency may have been found beside a wrong damping.
     """
-    near = [f for f in fits if f.left < TUNING.leading_misfit * fits[0].left or f.candidates[-1].key == looked.best]
+    near = [f for f in fits if f.left < TUNING.leading_misfit * fits[0].left or f.candidates[-1].key == scored.best]
     old = next((f for f in near if f.candidates[-1].is_oscillatory and len(f.own) == 2), None)
     if old is None:
         return list(fits)
     few = representative_recordings(old)
     begun = [
         (old.candidates, x)
-        for x in separate_minima(_ranked_places(inquiry, old.candidates, grid_scan(old), shifts, few))
+        for x in separate_minima(_ranked_points(inquiry, old.candidates, grid_scan(old), shifts, few))
     ]
     begun += _by_frequency(inquiry, old, shifts, few)
     made = inquiry.fits([Task(candidates=c, start=x, shifts=tuple(shifts), width=1) for c, x in begun])
@@ -90,28 +90,28 @@ def _by_frequency(
     """Where what rings last in a fit leaves least at all frequencies and shapes: first of the recording met worst."""
     *beside, last = old.candidates
     at = old.x[: len(old.x) - len(old.own)]
-    whole, places = frequency_scan(last, old.own)
+    whole, points = frequency_scan(last, old.own)
     candidates, worst = (*beside, whole), max(few, key=lambda r: old.blocks[r].total)
-    heard = _ranked_places(inquiry, candidates, [(*at, *own) for own in places], shifts, (worst,))[
+    heard = _ranked_points(inquiry, candidates, [(*at, *own) for own in points], shifts, (worst,))[
         : TUNING.most_oscillations
     ]
     plain = [
         whole.plain(x[len(at) :])
-        for x in separate_minima(_ranked_places(inquiry, candidates, [x for _, x in heard], shifts, few))
+        for x in separate_minima(_ranked_points(inquiry, candidates, [x for _, x in heard], shifts, few))
     ]
     return [((*beside, c), (*at, *own)) for c, own in plain]
 
 
-def _ranked_places(
+def _ranked_points(
     inquiry: Inquiry,
     candidates: Sequence[Candidate],
-    places: Sequence[tuple[float, ...]],
+    points: Sequence[tuple[float, ...]],
     shifts: Sequence[float],
     few: Sequence[int],
 ) -> list[tuple[float, tuple[float, ...]]]:
     """What is left of `few` recordings at those of some places that can be simulated, with these, the least first."""
-    look = partial(_misfit_of_few, candidates=tuple(candidates), shifts=tuple(shifts), few=tuple(few))
-    met = zip(inquiry.parallel_map(look, places), places, strict=True)
+    misfit_of_few = partial(_misfit_of_few, candidates=tuple(candidates), shifts=tuple(shifts), few=tuple(few))
+    met = zip(inquiry.parallel_map(misfit_of_few, points), points, strict=True)
     return sorted((there, x) for there, x in met if there is not None)
 
 
@@ -128,27 +128,27 @@ def _misfit_of_few(
 
 
 def _refit_on_few(
-    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]
+    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], scored: ScoreTest, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first, with those whose shape may be wrong for a few recordings alone, fitted together with it.
 
     Such a one meets most recordings far better than the best does, by the middle one, and leaves a few altogether: a
     face that is held lets go or does not.
     """
-    able = [c for c in inquiry.free(base) if c.shapes]
-    begun = [tuple((*base.x, *start) for start in (*looked.starts.get(c.key, ()), *c.starts())) for c in able]
+    able = [c for c in inquiry.free(base) if c.secondary]
+    begun = [tuple((*base.x, *start) for start in (*scored.starts.get(c.key, ()), *c.starts())) for c in able]
     most = TUNING.better_share * _middle(fits[0].blocks)
-    look = partial(_best_middle, beside=base.candidates, shifts=tuple(shifts), most=most)
-    met = zip(able, inquiry.parallel_map(look, list(zip(able, begun, strict=True))), strict=True)
-    places = [(c, x) for c, x in met if x is not None]
-    return _with_shape_starts(inquiry, base, fits, places, shifts)
+    best_middle = partial(_best_middle, beside=base.candidates, shifts=tuple(shifts), most=most)
+    met = zip(able, inquiry.parallel_map(best_middle, list(zip(able, begun, strict=True))), strict=True)
+    points = [(c, x) for c, x in met if x is not None]
+    return _with_shape_starts(inquiry, base, fits, points, shifts)
 
 
 def _with_shape_starts(
     inquiry: Inquiry,
     base: Fitted,
     fits: Sequence[Fitted],
-    places: Sequence[tuple[Candidate, tuple[float, ...]]],
+    points: Sequence[tuple[Candidate, tuple[float, ...]]],
     shifts: Sequence[float],
 ) -> list[Fitted]:
     """The fits, best first, with those of candidates fitted together with their shapes from places beside the base.
@@ -156,7 +156,7 @@ def _with_shape_starts(
     They are begun where least is left all along each parameter of the shape. One that comes nowhere near what the best
     fit leaves is not gone on with.
     """
-    sets = [((*base.candidates, c.whole()), starts_along_shape(c, x)) for c, x in places]
+    sets = [((*base.candidates, c.whole()), starts_along_shape(c, x)) for c, x in points]
     parts = [(candidates, tuple(every[k :: TUNING.parts])) for candidates, every in sets for k in range(TUNING.parts)]
     met = inquiry.parallel_map(partial(smallest_misfit, shifts=tuple(shifts)), parts)
     tasks = []
@@ -180,8 +180,8 @@ def _best_middle(
     most: float,
 ) -> tuple[float, ...] | None:
     """Where a candidate leaves least of the middle recording of those places; None if nowhere less than `most`."""
-    c, places = begun
-    met = [(left, x) for x in places if (left := _middle_at(problem, (*beside, c), x, shifts, most)) is not None]
+    c, points = begun
+    met = [(left, x) for x in points if (left := _middle_at(problem, (*beside, c), x, shifts, most)) is not None]
     return min(met)[1] if met else None
 
 
@@ -212,7 +212,7 @@ def _per_sample(block: ResidualBlock) -> float:
     return block.normal()[2] / block.residual.size
 
 
-def with_shapes(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+def with_secondary_parameters(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits with shapes fitted too where that pays, best first; other forms if the best leaves more than chance.
 
     Of an effect that takes next to nothing from what the base leaves no shape or form will take it all.
@@ -226,8 +226,10 @@ def with_shapes(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[
         is_near = f.left < TUNING.shaped_misfit * best or ahead < TUNING.shaped_misfit * min(held)
         if not is_near or base.left - f.left < TUNING.least_share * (base.left - size):
             continue
-        tasks = [continued_from(f, "shape")] if f.candidates[-1].shapes else []
-        tasks += [] if is_whole else [replace(continued_from(f, "shape"), form=c) for c in f.candidates[-1].forms()]
+        tasks = [continued_from(f, "shape")] if f.candidates[-1].secondary else []
+        tasks += (
+            [] if is_whole else [replace(continued_from(f, "shape"), variant=c) for c in f.candidates[-1].variants()]
+        )
         ways += [(k, replace(task, leaves=tuple(b.total for b in lead.blocks))) for task in tasks]
     made: dict[int, list[Fitted]] = {}
     for (k, _), new in zip(ways, _polished(inquiry, inquiry.fits([task for _, task in ways]), best), strict=True):
@@ -247,7 +249,7 @@ def _polished(inquiry: Inquiry, fits: Sequence[Fitted | None], best: float) -> l
     near = [
         f
         for f in fits
-        if f is not None and f.candidates[-1].form and f.left < TUNING.leading_misfit * least and not is_noise(f)
+        if f is not None and f.candidates[-1].variant and f.left < TUNING.leading_misfit * least and not is_noise(f)
     ]
     followed = inquiry.fits([continued_from(f, "polish") for f in near])
     better = {id(old): new for old, new in zip(near, followed, strict=True)}
@@ -258,7 +260,7 @@ def _fewest_parameters(fits: Sequence[Fitted], size: int) -> Fitted:
     """Of an effect in several forms the one that asks for least, of those that meet all as well."""
     least = min(f.left for f in fits)
     near = [f for f in fits if f.left < least + enough(least, size)]
-    return min(near, key=lambda f: (len(f.x), bool(f.candidates[-1].form), f.left))
+    return min(near, key=lambda f: (len(f.x), bool(f.candidates[-1].variant), f.left))
 
 
 def with_time_shifts(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:

@@ -22,7 +22,7 @@ from rollover.diagnosis.settings import SETTINGS
 TUNING = SETTINGS.selection.scan
 
 
-def look(
+def score_candidates(
     problem: Problem,
     base: Fitted,
     candidates: Sequence[Candidate],
@@ -121,7 +121,7 @@ def _step_reduced(
     if len(more) <= len(few):
         return first, first
     moving = sorted((c for c in candidates if c.kind != "sensor"), key=lambda c: -first.scores.get(c.key, 0.0))
-    closer = [replace(c, places=first.places.get(c.key, ())) for c in moving[: effort.shortlist]]
+    closer = [replace(c, points=first.points.get(c.key, ())) for c in moving[: effort.shortlist]]
     second = score_test(problem, base, [*closer, *(c for c in candidates if c.kind == "sensor")], more, beside)
     return first, replace(
         second,
@@ -150,7 +150,7 @@ def rescored(
     Those runs are known from the `first` look. Only if the best of their directions tells something are others made.
     """
     if base is not None and problem.effort.is_ensemble:
-        hinted = look(problem, current, candidates, groups, base, first.only)
+        hinted = score_candidates(problem, current, candidates, groups, base, first.only)
         if hinted.p_value() > TUNING.hint_p_value:
             return hinted
-    return look(problem, current, candidates, groups, parallel_map=parallel_map)
+    return score_candidates(problem, current, candidates, groups, parallel_map=parallel_map)

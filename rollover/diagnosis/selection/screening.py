@@ -66,11 +66,11 @@ def screen(
     candidates: Sequence[Candidate],
     few: Sequence[int],
     shifts: Sequence[float],
-    looked: ScoreTest,
+    scored: ScoreTest,
 ) -> list[Screened]:
     """Look at each candidate in some places beside the base, on a few recordings, from time `shifts` (s) of all.
 
-    Not far from an explanation the places to which `looked` leads are enough.
+    Not far from an explanation the places to which `scored` leads are enough.
     """
     problem = inquiry.problem
     beside = [problem.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]
@@ -79,31 +79,31 @@ def screen(
         return []
     near = not is_far(problem, base) and not problem.effort.is_ensemble
 
-    def places(c: Candidate) -> tuple[tuple[float, ...], ...]:
-        ways = () if problem.effort.is_ensemble and not c.is_placed else looked.starts.get(c.key, ())
+    def points(c: Candidate) -> tuple[tuple[float, ...], ...]:
+        ways = () if problem.effort.is_ensemble and not c.is_placed else scored.starts.get(c.key, ())
         is_led = (near or c.is_placed) and ways and not c.is_discontinuous
         return tuple(ways if is_led else (*ways, *c.starts()))
 
-    problem.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in places(c) for r in few)
-    things = [_Look(candidate=c, places=places(c), far=looked.far.get(c.key, ())) for c in candidates]
-    look = partial(
+    problem.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in points(c) for r in few)
+    items = [_Screening(candidate=c, points=points(c), far=scored.far.get(c.key, ())) for c in candidates]
+    screening = partial(
         _screened, base=(base.candidates, base.x), few=tuple(few), shifts=tuple(shifts[r] for r in few), blocks=blocks
     )
-    return [s for s in inquiry.parallel_map(look, things) if s is not None]
+    return [s for s in inquiry.parallel_map(screening, items) if s is not None]
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Look:
+class _Screening:
     """A candidate, where it is looked at, and where it may begin in any case."""
 
     candidate: Candidate
-    places: tuple[tuple[float, ...], ...]
+    points: tuple[tuple[float, ...], ...]
     far: tuple[tuple[float, ...], ...]
 
 
 def _screened(
     problem: Problem,
-    thing: _Look,
+    item: _Screening,
     *,
     base: Point,
     few: tuple[int, ...],
@@ -111,9 +111,9 @@ def _screened(
     blocks: tuple[ResidualBlock, ...],
 ) -> Screened | None:
     """One candidate looked at beside a base, which few recordings meet by these blocks; None if nothing can be made."""
-    c, potential = thing.candidate, 0.0
+    c, potential = item.candidate, 0.0
     looked_at: list[tuple[bool, float, tuple[float, ...]]] = []
-    for start in thing.places:
+    for start in item.points:
         left, along, size, count = 0.0, 0.0, 0.0, 0
         for r, shift, block in zip(few, shifts, blocks, strict=True):
             there = problem.block(r, (*base[0], c), (*base[1], *start), shift, 0.0)
@@ -135,7 +135,7 @@ def _screened(
         return None
     # a fit finds no way from where nothing moves, however little less is left there than where too much does
     met = [(left, start) for _, left, start in sorted(looked_at)]
-    starts = tuple(dict.fromkeys((*thing.far, *_begun_at(c, met))))
+    starts = tuple(dict.fromkeys((*item.far, *_begun_at(c, met))))
     return Screened(candidate=c, starts=starts, left=met[0][0], potential=potential)
 
 
@@ -164,13 +164,13 @@ def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float,
 
 
 def promising(
-    candidates: Sequence[Candidate], looked: ScoreTest, effort: Effort = SETTINGS.forward.drops
+    candidates: Sequence[Candidate], scored: ScoreTest, effort: Effort = SETTINGS.forward.drops
 ) -> list[Candidate]:
     """Those that scored best, and of two parameters all: beside their thresholds a score tells little.
 
     Where each costs runs, of these only the family of what leads, and a few that move the vehicle in any case.
     """
-    ranked = looked.ranked(candidates)
+    ranked = scored.ranked(candidates)
     if effort.scored is not None:
         moving = [c for c in ranked if c.kind != "sensor"][: effort.promising]
         related = of_same_family(ranked, effort.scored, effort.leaders)

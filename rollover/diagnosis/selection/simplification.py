@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.linearisation import Fitted, ends_at_bound, first_effect_last
+from rollover.diagnosis.fit.linearisation import Fitted, first_effect_last, is_at_bound
 from rollover.diagnosis.fit.local_search import ended, polish, with_time_shift_search, without_effect
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinates, with_slices
 from rollover.diagnosis.fit.step import Inquiry, Step
@@ -40,7 +40,7 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
         if new.left < old.left:
             found = _with_rivals(inquiry, found.moved_to(new))
             left = mismatch_of(problem.dataset, new.blocks, phases)
-    for simple in (simpler, _in_usual_shapes, with_fewer_parameters):
+    for simple in (simpler, _with_usual_secondary, with_fewer_parameters):
         other = simple(inquiry, found)
         if other is not None:
             found, left = other, mismatch_of(problem.dataset, other.fitted.blocks, phases)
@@ -55,7 +55,7 @@ def simpler(inquiry: Inquiry, found: Step) -> Step | None:
     """
     best, beside, shared = found.fitted, *_shared(found.fitted)
     begun = list(_limiting_effects(inquiry, best))
-    if ends_at_bound(best):
+    if is_at_bound(best):
         able = sorted(found.rivals, key=lambda f: f.left)
         able = [f for f in able if len(f.own) < len(best.own) and f.left < found.base.left][: TUNING.simpler_rivals]
         begun += [((*beside, f.candidates[-1]), f.own) for f in able]
@@ -97,7 +97,7 @@ def _with_rivals(inquiry: Inquiry, found: Step) -> Step:
     return replace(found, rivals=tuple(rivals))
 
 
-def _in_usual_shapes(inquiry: Inquiry, found: Step) -> Step | None:
+def _with_usual_secondary(inquiry: Inquiry, found: Step) -> Step | None:
     """A step of several effects with those in their usual shape that need no other beside each other; None if none.
 
     What had to be bent to do another's work as well is straight again once that stands beside it.
@@ -149,7 +149,7 @@ def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
     tasks = [
         Task(
             candidates=(*beside, c),
-            start=(*shared, *c.probes()[0]),
+            start=(*shared, *c.scan_points()[0]),
             shifts=shifts,
             rounds=SETTINGS.selection.forward_step.short_rounds,
         )

@@ -26,7 +26,7 @@ from rollover.diagnosis.selection.explanation import with_conditions_refitted
 from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.forward_step import largest_change, size_of_effect, step, with_noise_of_fit
 from rollover.diagnosis.selection.pairs import best_subsets, with_first_exchanged
-from rollover.diagnosis.selection.scan import look, rescored
+from rollover.diagnosis.selection.scan import rescored, score_candidates
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.simplification import followed
 from rollover.diagnosis.settings import SETTINGS
@@ -38,7 +38,7 @@ TUNING = SETTINGS.selection.stepwise
 class Taken:
     """The base, the steps taken beside it, the fit with all of them (the base itself if none), and what it leaves.
 
-    `first` is the first step, taken or not; `at_first` what all candidates scored beside the base, `looked` beside the
+    `first` is the first step, taken or not; `at_first` what all candidates scored beside the base, `scored` beside the
     last fit; `refuted` whether the best candidate's gain did not outlast the scatter of its own runs; `paired` whether
     all were tried two by two.
     """
@@ -50,7 +50,7 @@ class Taken:
     left: Mismatch
     first: Step | None
     at_first: ScoreTest
-    looked: ScoreTest
+    scored: ScoreTest
     refuted: bool = False
     paired: bool = False
 
@@ -75,11 +75,15 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
     before = mismatch_of(problem.dataset, base.blocks, phases)
     base = with_full_weights(problem, base)
     inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
-    looked = first_look = look(problem, base, candidates, groups, parallel_map=inquiry.executor.parallel_map)
+    scored = first_scored = score_candidates(
+        problem, base, candidates, groups, parallel_map=inquiry.executor.parallel_map
+    )
 
     def beside(fitted: Fitted, left: Mismatch) -> ScoreTest:
         known = base if is_enough(problem, fitted, left) else None
-        return rescored(problem, fitted, known, inquiry.free(fitted), groups, first_look, inquiry.executor.parallel_map)
+        return rescored(
+            problem, fitted, known, inquiry.free(fitted), groups, first_scored, inquiry.executor.parallel_map
+        )
 
     current, left = base, before
     taken = list(begun)
@@ -87,12 +91,12 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
     if taken:
         current = taken[-1].fitted
         left = mismatch_of(problem.dataset, current.blocks, phases)
-        looked = beside(current, left)
+        scored = beside(current, left)
     refuted = paired = False
     for _ in range(SETTINGS.selection.flexibility.most_effects - len(begun)):
         if is_tolerated(problem, current):
             break
-        if looked.p_value() > TUNING.admitting_p_value and is_enough(problem, current, left):
+        if scored.p_value() > TUNING.admitting_p_value and is_enough(problem, current, left):
             break
         if (
             not taken
@@ -100,11 +104,11 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
             and is_explained_by_clocks(problem, base, inquiry.executor.parallel_map)
         ):
             break
-        tried = step(inquiry, current, looked)
+        tried = step(inquiry, current, scored)
         first = first or tried
         if not is_beyond_chance(tried, problem, phases):
             break
-        found = validated_step(inquiry, tried, looked)
+        found = validated_step(inquiry, tried, scored)
         if found is None and not taken:
             found = with_other_weighting(inquiry, current)
             first = found or first
@@ -121,7 +125,7 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
             # of two that are strong the first may have been taken for something else
             other = None
             if pairs and not problem.effort.is_ensemble:
-                other, paired = best_subsets(inquiry, taken, first_look, current), True
+                other, paired = best_subsets(inquiry, taken, first_scored, current), True
             elif problem.effort.is_ensemble and current.left - count < TUNING.hopeless_share * (base.left - count):
                 other = with_first_exchanged(inquiry, taken, current)
             if other is not None:
@@ -131,7 +135,7 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
         )
         if is_lost or is_over_flexible(current.effects):
             break
-        looked = beside(current, left)
+        scored = beside(current, left)
     if not problem.heavy_tailed:
         problem.heavy_tailed, current = True, problem.again(current)
         left = mismatch_of(problem.dataset, current.blocks, phases)
@@ -142,8 +146,8 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
         before=before,
         left=left,
         first=first,
-        at_first=first_look,
-        looked=looked,
+        at_first=first_scored,
+        scored=scored,
         refuted=refuted,
         paired=paired,
     )
@@ -191,7 +195,7 @@ def leaves_mismatch(fitted: Fitted, problem: Problem, phases: Phases) -> bool:
     return not is_enough(problem, fitted, mismatch_of(problem.dataset, fitted.blocks, phases))
 
 
-def validated_step(inquiry: Inquiry, found: Step, looked: ScoreTest) -> Step | None:
+def validated_step(inquiry: Inquiry, found: Step, scored: ScoreTest) -> Step | None:
     """A step as it is to be taken; None where runs scatter and its gain does not outlast that."""
     problem = inquiry.problem
     spoken = (
@@ -200,7 +204,7 @@ def validated_step(inquiry: Inquiry, found: Step, looked: ScoreTest) -> Step | N
         else TUNING.admitting_p_value_runs
     )  # what admitted the step speaks for its best
     return (
-        ensemble_validated(problem, without_unsupported_rivals(found, looked, spoken), inquiry.groups)
+        ensemble_validated(problem, without_unsupported_rivals(found, scored, spoken), inquiry.groups)
         if problem.effort.is_ensemble
         else found
     )
@@ -214,13 +218,13 @@ def with_other_weighting(inquiry: Inquiry, current: Fitted) -> Step | None:
     """
     problem = inquiry.problem
     before = problem.heavy_tailed
-    if before and sum(has_diverged(b.heavy_tail) for b in current.blocks) < TUNING.most_other_courses:
+    if before and sum(has_diverged(b.heavy_tail) for b in current.blocks) < TUNING.most_diverged:
         return None
     problem.heavy_tailed = not before
     base = problem.again(current)
-    looked = look(problem, base, inquiry.candidates, inquiry.groups)
-    tried = step(inquiry, base, looked)
-    found = validated_step(inquiry, tried, looked) if is_beyond_chance(tried, problem, inquiry.phases) else None
+    scored = score_candidates(problem, base, inquiry.candidates, inquiry.groups)
+    tried = step(inquiry, base, scored)
+    found = validated_step(inquiry, tried, scored) if is_beyond_chance(tried, problem, inquiry.phases) else None
     if found is None:
         problem.heavy_tailed = before
     return found

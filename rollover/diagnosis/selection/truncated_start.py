@@ -19,7 +19,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.tasks import Task
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.noise.truncation import up_to
 from rollover.diagnosis.selection.pairs import is_better
 from rollover.diagnosis.selection.stepwise import Taken, forward_selection
@@ -27,7 +27,7 @@ from rollover.diagnosis.settings import SETTINGS
 
 TUNING = SETTINGS.selection.truncated_start
 # of the time to the deepest point: before it, as the ground springs back, and before what bounces comes down again
-ENDS = (1.0 - SETTINGS.data.phases.around_peak, *TUNING.later_ends)
+TRUNCATIONS = (1.0 - SETTINGS.data.phases.around_peak, *TUNING.later_truncations)
 
 
 def loading_first(inquiry: Inquiry, found: Taken) -> Taken:
@@ -38,7 +38,7 @@ def loading_first(inquiry: Inquiry, found: Taken) -> Taken:
     if rebound_residual(inquiry, base) < TUNING.least_share * (found.fitted.left - found.count):
         return found  # it came to rest as the simulation does, wherever that was
     steps: Sequence[Step] = ()
-    for end in ENDS:
+    for end in TRUNCATIONS:
         above = _until(inquiry, end, steps)
         if (
             above is None
@@ -85,7 +85,7 @@ def _until(inquiry: Inquiry, end: float, steps: Sequence[Step]) -> Taken | None:
     if len(early.dataset) < len(some):
         return None
     inquiry.say(f"up to {end:g} of the way down first")
-    align(early)
+    estimate_time_shifts(early)
     no_jacobian, above = early.fit((), ()), replace(inquiry, problem=early)
     found = (
         forward_selection(above, no_jacobian, _extended_to_end(above, no_jacobian, steps), pairs=False)

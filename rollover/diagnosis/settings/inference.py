@@ -117,7 +117,7 @@ class LocalQuadratic:
     # 1997)
     clear_slope: float = 10.0
     some_slope: float = 1.0  # the same ratio: a slope is determined at all; chosen
-    least_places: int = 6  # places that determine a slope; chosen
+    least_points: int = 6  # places that determine a slope; chosen
     same_slope: float = 0.8  # share of the slope at the fit: from it on the mean's is the same; chosen
     normal_quantile: float = 1.96  # two-sided 95 % quantile of the standard normal distribution; definition
     # ratio to the rise that slopes predict: above it, and `outlier_rise`, a run took another course; chosen

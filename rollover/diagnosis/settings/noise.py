@@ -59,10 +59,12 @@ class Ensemble:
     full_weight: float = 0.99  # weight: channels above it everywhere are not reweighted; chosen
     state_size: int = 14  # numbers (d): dimension of the vehicle's state; position and velocity of a body, and an axle
     least_channels: int = 3  # channels: with fewer none is distinguished from another course; chosen
-    other_course: float = 0.5  # share of a recording's full weight: below it the recording took another course; chosen
-    other_course_rate: float = 0.15  # probability of another course for one recording; chosen
-    other_course_p_value: float = 0.02  # p-value of the number of other courses: below it they are no chance; chosen
-    least_neighbours: int = 2  # neighbours that show how far one more may go; chosen
+    diverged_share: float = (
+        0.5  # share of a recording's full weight: below it the recording took another course; chosen
+    )
+    divergence_rate: float = 0.15  # probability of another course for one recording; chosen
+    divergence_p_value: float = 0.02  # p-value of the number of other courses: below it they are no chance; chosen
+    least_perturbed: int = 2  # neighbours that show how far one more may go; chosen
     outlier_power: float = 9.0  # ratio to the neighbours' median power: beyond it one took another course; chosen
 
 
@@ -105,7 +107,7 @@ class Outliers:
     median_width: int = 13  # samples of the running median; chosen
     # ratio to the usual distance from the median: beyond it a sample is in a burst; chosen
     outlier_distance: float = 5.0
-    burst_ratio: float = 1.5  # ratio to the noise beside bursts: above it bursts are no noise; chosen
+    outlier_ratio: float = 1.5  # ratio to the noise beside bursts: above it bursts are no noise; chosen
     least_clean_share: float = 0.7  # share of the samples beside bursts; chosen
     outlier_rate: float = 0.01  # share of a channel's samples that may be outliers of any noise; chosen
 
