@@ -169,7 +169,7 @@ class Candidate:
         return list(itertools.product(*axes))
 
     def strong(self) -> list[tuple[float, ...]]:
-        """Coordinates where the effect is strong, one parameter at a time, and `scan_points`; none where runs are cheap.
+        """Coordinates where the effect is strong, one parameter at a time, and `scan_points`; none of drops.
 
         Where it acts, if that is a parameter, is spread as there; what begins at no strength at all has one end.
         """

@@ -66,6 +66,7 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
     Two that leave more than noise are given for the best of all `pairs`, if these are to be tried.
     """
     problem, candidates, groups, phases = inquiry.problem, inquiry.candidates, inquiry.groups, inquiry.phases
+    parallel_map = inquiry.executor.parallel_map
     count = sum(b.residual.size for b in base.blocks)
     clocked = restarted_base if problem.effort.is_ensemble else with_time_shift_search
     base = clocked(problem, base)  # what a clock leaves is no noise,
@@ -75,15 +76,11 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
     before = mismatch_of(problem.dataset, base.blocks, phases)
     base = with_full_weights(problem, base)
     inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
-    scored = first_scored = score_candidates(
-        problem, base, candidates, groups, parallel_map=inquiry.executor.parallel_map
-    )
+    scored = first_scored = score_candidates(problem, base, candidates, groups, parallel_map=parallel_map)
 
     def beside(fitted: Fitted, left: Mismatch) -> ScoreTest:
         known = base if is_enough(problem, fitted, left) else None
-        return rescored(
-            problem, fitted, known, inquiry.free(fitted), groups, first_scored, inquiry.executor.parallel_map
-        )
+        return rescored(problem, fitted, known, inquiry.free(fitted), groups, first_scored, parallel_map)
 
     current, left = base, before
     taken = list(begun)
@@ -98,11 +95,7 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
             break
         if scored.p_value() > TUNING.admitting_p_value and is_enough(problem, current, left):
             break
-        if (
-            not taken
-            and not problem.effort.is_ensemble
-            and is_explained_by_clocks(problem, base, inquiry.executor.parallel_map)
-        ):
+        if not taken and not problem.effort.is_ensemble and is_explained_by_clocks(problem, base, parallel_map):
             break
         tried = step(inquiry, current, scored)
         first = first or tried
