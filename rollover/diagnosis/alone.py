@@ -69,7 +69,7 @@ def best_predictor(problem: Problem, one: Step, groups: Groups) -> Fitted:
     bends to the one channel that the discrepancy touches least; what is left of each channel counts alike.
     """
     able = [one.fitted, *(f for f in one.rivals if not is_at_bound(f) and f is not one.fitted)]
-    ahead = min(able, key=lambda f: held_out(f, groups).left.sum())
+    ahead = min(able, key=lambda f: held_out(f, groups).chi2.sum())
 
     def is_behind(f: Fitted) -> bool:
         more = share_beyond(problem, one.base, f, ahead, groups)
@@ -118,14 +118,14 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
     same family.
     """
     near = confusion_set(one, groups, problem.samples_per_error)
-    best, start = one.fitted, float(held_out(one.base, groups).left.sum())
-    most = start - float(held_out(best, groups).left.sum())
+    best, start = one.fitted, float(held_out(one.base, groups).chi2.sum())
+    most = start - float(held_out(best, groups).chi2.sum())
     probable = credible(problem, one.rivals)
     for rival in one.rivals:
         becomes_best = len(rival.x) > len(best.x) and is_at_bound(rival)
         if becomes_best or any(rival is f for f in near):
             continue
-        gain = start - float(held_out(rival, groups).left.sum())
+        gain = start - float(held_out(rival, groups).chi2.sum())
         is_kin = rival.candidates[-1].family == best.candidates[-1].family
         is_probable = (is_kin or gain > TUNING.half_share * most) and any(rival is f for f in probable)
         if ((is_kin or is_tolerated(problem, rival)) and gain >= TUNING.nearly_all * most) or is_probable:

@@ -35,7 +35,7 @@ def shares(problem: Problem, found: Explanation, groups: Groups) -> tuple[Share 
     due = _due(problem, found.base, groups)
     each = {}
     for step in found.parts:
-        without, with_ = held_out(step.base, groups).left, held_out(step.fitted, groups).left
+        without, with_ = held_out(step.base, groups).chi2, held_out(step.fitted, groups).chi2
         each[step.fitted.candidates[-1].key] = jackknifed(without - with_, due, groups)
     return whole, each
 
@@ -50,13 +50,13 @@ def share_beyond(problem: Problem, base: Fitted, one: Fitted, other: Fitted, gro
     due = _due(problem, base, groups)
     if float(np.sum(due)) <= 0.0:
         return None
-    return jackknifed(held_out(one, groups).left - held_out(other, groups).left, due, groups)
+    return jackknifed(held_out(one, groups).chi2 - held_out(other, groups).chi2, due, groups)
 
 
 def _due(problem: Problem, base: Fitted, groups: Groups) -> Array:
     """What a base leaves of each recording held out beyond what noise does, (recordings,)."""
     noise = np.array([_noise_sum_of_squares(e) for e in problem.dataset])
-    return np.asarray(held_out(base, groups).left - noise)
+    return np.asarray(held_out(base, groups).chi2 - noise)
 
 
 def jackknifed(gained: Array, due: Array, groups: Groups) -> Share:

@@ -49,8 +49,8 @@ def rejected_effects(
     if after.total >= held_out(found.base, groups).total:
         return {e.id for e in effects}
     if not in_doubt:
-        left, rivals = float(after.left.sum()), found.first.rivals if found.first is not None else ()
-        better = any(not is_at_bound(f) and float(held_out(f, groups).left.sum()) < left for f in rivals)
+        left, rivals = float(after.chi2.sum()), found.first.rivals if found.first is not None else ()
+        better = any(not is_at_bound(f) and float(held_out(f, groups).chi2.sum()) < left for f in rivals)
         return at_bounds(effects) if better else set()
     null = {e.id for e in effects if may_be_null(e)}
     if len(effects) == 1 and null and is_clear_of_null(problem, found.fitted):
@@ -94,7 +94,7 @@ def null_side(problem: Problem, fitted: Fitted) -> tuple[str, float, bool] | Non
     count = sum(b.residual.size for b in fitted.blocks)
     due = (
         SETTINGS.inference.local_quadratic.normal_quantile**2
-        * max(1.0, fitted.left / count)
+        * max(1.0, fitted.chi2 / count)
         * problem.samples_per_error
     )
     shifts, others = [b.shift for b in fitted.blocks], [v for j, v in enumerate(fitted.x) if j != k]
@@ -103,7 +103,7 @@ def null_side(problem: Problem, fitted: Fitted) -> tuple[str, float, bool] | Non
         there = problem.fit(
             held_at(fitted, k, place), others, rounds=SETTINGS.inference.intervals.held_rounds, shifts=shifts, width=1
         )
-        return there is None or there.left - fitted.left < due
+        return there is None or there.chi2 - fitted.chi2 < due
 
     beyond, inside = min(max(end, 0.0), 1.0), at
     if is_met(beyond):
@@ -134,8 +134,8 @@ def next_best(
     first = found.first
     if first is None:
         return found.refused()
-    start = float(held_out(first.base, groups).left.sum())
-    left = {f.label: float(held_out(f, groups).left.sum()) for f in first.rivals}
+    start = float(held_out(first.base, groups).chi2.sum())
+    left = {f.label: float(held_out(f, groups).chi2.sum()) for f in first.rivals}
     most = max((start - v for v in left.values()), default=0.0)
     able = [
         f

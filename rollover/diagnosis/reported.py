@@ -188,7 +188,7 @@ def _with_next_test(c: Conclusion) -> tuple[Named, ...]:
     rivals = [f for f in step.rivals if f.candidates[-1].id in effect.indistinguishable_from]
     if len(effect.indistinguishable_from) != 1 or not rivals or len(c.explanation.fitted.candidates) != 1:
         return c.effects
-    found = next_test(c.asked.scenario, c.problem.dataset, c.explanation.fitted, min(rivals, key=lambda f: f.left))
+    found = next_test(c.asked.scenario, c.problem.dataset, c.explanation.fitted, min(rivals, key=lambda f: f.chi2))
     return (replace(effect, next_test=found),)
 
 

@@ -78,7 +78,7 @@ def chosen_rightly(
 
 def misfit(fitted: Fitted) -> float:
     """What a fit leaves; samples about its own leaps, which count nothing there, by what noise leaves of each: 1."""
-    return fitted.left + sum(np.count_nonzero(b.residual == 0.0) for b in fitted.blocks)
+    return fitted.chi2 + sum(np.count_nonzero(b.residual == 0.0) for b in fitted.blocks)
 
 
 def main() -> None:

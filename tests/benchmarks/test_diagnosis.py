@@ -104,7 +104,7 @@ def gains(problem: Problem, every: list[Balance], method: Method) -> tuple[float
         for k, b in enumerate(every):
             if b.condition == condition:
                 squares[1] += np.sum(b.force**2), np.sum((b.force - means[k] @ c) ** 2)
-        for r, e in enumerate(problem.evidence):
+        for r, e in enumerate(problem.dataset):
             if (e.condition or e.name) == condition:
                 without = problem.clocked(r, (), (), problem.shifts[r], ROUNDS)
                 beside = problem.clocked(r, (law,), (), problem.shifts[r], ROUNDS)

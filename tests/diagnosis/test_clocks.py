@@ -148,7 +148,7 @@ def test_fits_from_two_places_end_at_one() -> None:
     candidate = {c.id: c for c in candidates_of(problem.dataset, (), "drop")}["soil-stiffness"]
     estimate_time_shifts(problem)
     ends = [problem.fit((candidate,), (start,)) for start in (0.40, 0.5, 0.62)]
-    left = [ended(problem, f).left for f in ends if f is not None]
+    left = [ended(problem, f).chi2 for f in ends if f is not None]
     assert len(left) == 3
     assert max(left) - min(left) < 0.01
 

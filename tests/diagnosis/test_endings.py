@@ -51,7 +51,7 @@ def test_rivals_restart_beside_where_the_best_fit_ended() -> None:
     best, rival = fitted("mass", 1.0, (0.7, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
     after = simplification._with_rivals(cast(Inquiry, SimpleNamespace(fits=fits)), step(best, rival))
     assert asked == [("guide-friction", (0.7, 0.4))]
-    assert [f.left for f in after.rivals] == [1.0, 4.0]
+    assert [f.chi2 for f in after.rivals] == [1.0, 4.0]
 
 
 def test_rivals_restart_beside_the_best_models_variant() -> None:
@@ -299,7 +299,7 @@ def test_what_mirrors_the_last_effect_competes_with_it(profile_extents: float, k
     found = simplification.with_mirror_rivals(there, step(best, *rivals))
     assert found.fitted is best
     if known is not None and profile_extents > known:
-        assert [f.left for f in found.rivals] == pytest.approx([5.0, known])
+        assert [f.chi2 for f in found.rivals] == pytest.approx([5.0, known])
     else:
-        assert [f.left for f in found.rivals] == pytest.approx([5.0, profile_extents])
+        assert [f.chi2 for f in found.rivals] == pytest.approx([5.0, profile_extents])
         assert found.rivals[-1].x == pytest.approx((0.9, 0.4, 0.25), rel=1e-12)  # rounding: a logarithm and back

@@ -141,7 +141,7 @@ def test_a_first_fit_ends_alike_with_and_without_jacobian() -> None:
     assert a is not None
     assert b is not None
     assert (b.x, [one.shift for one in b.blocks]) == (a.x, [one.shift for one in a.blocks])
-    assert b.left == a.left
+    assert b.chi2 == a.chi2
     assert all(np.any(one.J) for one in a.blocks)
     assert not any(np.any(one.J) for one in b.blocks)
     assert first.simulations <= whole.simulations - 2 * len(recordings)
@@ -178,7 +178,7 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
         assert a is not None
         assert b is not None
         assert a.x == b.x
-        assert a.left == b.left
+        assert a.chi2 == b.chi2
 
 
 def test_what_was_fitted_is_taken_up_again(tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ def test_what_was_fitted_is_taken_up_again(tmp_path: Path) -> None:
     assert first is not None
     assert again is not None
     assert again.x == first.x
-    assert again.left == pytest.approx(first.left, rel=1e-12)
+    assert again.chi2 == pytest.approx(first.chi2, rel=1e-12)
     assert other.simulations < problem.simulations
     assert Executor(notebook=notebook, about="another scenario")._done.keys() == other_crew._done.keys()
     assert task.key("another") not in other_crew._done
@@ -315,7 +315,7 @@ def test_far_from_noise_a_fit_stops_at_a_small_gain(monkeypatch: pytest.MonkeyPa
             own = problem.no_jacobian()
             found = own.fit((candidate(problem, key),), start)
             assert found is not None
-            ends[key, trifling] = found.x, found.left, own.simulations
+            ends[key, trifling] = found.x, found.chi2, own.simulations
     (x, left, made), (y, more, fewer) = (
         ends["soil-rate-hardening", t] for t in (0.0, SETTINGS.fit.levenberg_marquardt.converged_share)
     )
@@ -373,5 +373,5 @@ def test_a_rebound_is_searched_from_the_laws_own_restitution() -> None:
     c = next(c for c in candidates_of(problem.dataset, (), "drop", scenario()) if c.key == "soil-elastic-rebound")
     assert c.search["recovery"].low == own > 0.0
     fits = [f for start in c.starts()[:8] if (f := problem.fit((c,), start)) is not None]  # the lowest it may be
-    best = min(fits, key=lambda f: f.left)
+    best = min(fits, key=lambda f: f.chi2)
     assert c.values(best.x)["recovery"] == pytest.approx(0.0222, rel=0.02)

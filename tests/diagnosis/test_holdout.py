@@ -47,7 +47,7 @@ def test_the_best_fit_is_cross_validated_by_refits_in_doubt() -> None:
     problem = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
     fitted = problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
     assert fitted is not None
-    groups, ahead = [[0], [1], [2]], held_out(fitted, [[0], [1], [2]]).left.sum()
+    groups, ahead = [[0], [1], [2]], held_out(fitted, [[0], [1], [2]]).chi2.sum()
     way = [b.J[:, 0] / np.linalg.norm(b.J) for b in fitted.blocks]
     flat = [
         replace(b, J=0.1 * b.J, residual=b.residual + 0.5 * w) for b, w in zip(fitted.blocks[1:], way[1:], strict=True)
@@ -55,8 +55,8 @@ def test_the_best_fit_is_cross_validated_by_refits_in_doubt() -> None:
     lead = replace(fitted, blocks=(fitted.blocks[0], *flat))
     rival = replace(fitted, blocks=tuple(replace(b, residual=1.01 * b.residual) for b in lead.blocks))
     rival = replace(rival, cross_validated=tuple(1.01 * b.total for b in fitted.blocks))
-    assert lead.left < rival.left
-    assert held_out(rival, groups).left.sum() < held_out(lead, groups).left.sum() < 1.2**2 * lead.left
+    assert lead.chi2 < rival.chi2
+    assert held_out(rival, groups).chi2.sum() < held_out(lead, groups).chi2.sum() < 1.2**2 * lead.chi2
     asked: list[Any] = []
 
     def parallel_map(problem: Problem, look: Any, things: Sequence[Any]) -> list[Any]:
@@ -69,6 +69,6 @@ def test_the_best_fit_is_cross_validated_by_refits_in_doubt() -> None:
     new, beside = _refitted_where_slopes_mislead(inquiry, [lead, rival])
     assert beside is rival
     assert new.cross_validated is not None
-    assert held_out(new, groups).left.sum() == pytest.approx(ahead, rel=0.01)
+    assert held_out(new, groups).chi2.sum() == pytest.approx(ahead, rel=0.01)
     assert asked == [groups]
     assert _refitted_where_slopes_mislead(inquiry, [fitted, rival])[0] is fitted  # it foretells best as it is

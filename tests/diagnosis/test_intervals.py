@@ -166,7 +166,7 @@ def test_an_interval_follows_a_crooked_valley(profile_extents: float, begun: flo
     def fit(candidates: list[Candidate], x: list[float], **_: Any) -> Any:
         at = candidates[0].fixed["stiffness"]
         held_at.append((at, x))
-        return SimpleNamespace(left=100.0 + due * ((at - 0.5) / (0.04 * profile_extents)) ** 2, x=(0.1,), blocks=())
+        return SimpleNamespace(chi2=100.0 + due * ((at - 0.5) / (0.04 * profile_extents)) ** 2, x=(0.1,), blocks=())
 
     c = Candidate(id="a", kind="physics", family="", search={"stiffness": Search(0, 1), "nose_share": Search(0, 1)})
     fitted: Any = SimpleNamespace(candidates=(c,), x=(0.5, 0.2), blocks=())
@@ -279,7 +279,7 @@ def test_without_slopes_an_interval_ends_by_the_misfit() -> None:
         assert x == [0.2], "the other one is free"
         assert [list(c.search) for c in candidates] == [["b"], []]
         asked.append(candidates[1].fixed["a"])
-        return SimpleNamespace(left=1000.0 if asked[-1] < 0.3 else 5.0)
+        return SimpleNamespace(chi2=1000.0 if asked[-1] < 0.3 else 5.0)
 
     other = Candidate(id="mass", kind="parameter", family="", search={"b": Search(0, 1)})
     pull = Candidate(id="soil-adhesion", kind="physics", family="", search={"a": Search(0, 1)})

@@ -101,9 +101,9 @@ def test_runs_predict_held_out_data_where_slopes_hold_nearby() -> None:
     A, b = (np.array([block.normal()[k].item() for block in off.blocks]) for k in (0, 1))
     own, asked = b[3] / A[3], b[:3].sum() / A[:3].sum()
     explained = A[3] * own**2
-    assert told.left[3] == pytest.approx((1.0 - 8.0 * asked / own) ** 2 * explained + w - explained, rel=1e-6)
-    assert told.left[3] > 40.0 * w
-    assert run.left[3] < 2.0 * noise < 0.5 * w
+    assert told.chi2[3] == pytest.approx((1.0 - 8.0 * asked / own) ** 2 * explained + w - explained, rel=1e-6)
+    assert told.chi2[3] > 40.0 * w
+    assert run.chi2[3] < 2.0 * noise < 0.5 * w
     base = problem.fit((), ())
     assert base is not None
     assert cross_validated(problem, base, groups) is base
@@ -179,7 +179,7 @@ def test_with_what_leads_its_kin_gets_a_first_fit() -> None:
     two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
     every = [Candidate(id=i, kind="physics", family=f, search=two, null=(None, 0.5)) for i, f in kinds]
     every += [Candidate(id=i, kind="sensor", family="depth", search={}) for i in ("g", "h", "i")]
-    screened = [Screened(candidate=c, starts=(), left=float(k), potential=0.0) for k, c in enumerate(every)]
+    screened = [Screened(candidate=c, starts=(), chi2=float(k), potential=0.0) for k, c in enumerate(every)]
     scored = ScoreTest(score=9.0, scores={c.key: 9.0 - k for k, c in enumerate(every)}, null=np.zeros(9), detectable={})
     chosen = {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, scored)}
     assert chosen == {"a", "b", "c", "d", "f", "g", "h", "i"}
@@ -282,8 +282,8 @@ def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyP
     assert base is not None
     assert right is not None
     assert lucky is not None
-    assert lucky.left < right.left
-    assert ensemble_mean_misfit(problem, right)[0] < 0.5 * right.left
+    assert lucky.chi2 < right.chi2
+    assert ensemble_mean_misfit(problem, right)[0] < 0.5 * right.chi2
     assert ensemble_mean_misfit(problem, lucky)[0] > 10.0 * ensemble_mean_misfit(problem, right)[0]
     early = [replace(e, first_impact=TIME[20]) for e in every]
     problem.with_noise_model(early)

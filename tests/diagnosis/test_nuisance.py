@@ -66,7 +66,7 @@ def test_uncertain_speeds_explain_what_they_can_and_no_more() -> None:
         estimate_time_shifts(problem)
         base = problem.fit((), ())
         assert base is not None
-        left[sigma] = np.sqrt(base.left / sum(e.count for e in found))
+        left[sigma] = np.sqrt(base.chi2 / sum(e.count for e in found))
     assert left[0.0] > 1.6
     assert left[0.06] < 1.15
     missing = dataset(
@@ -75,7 +75,7 @@ def test_uncertain_speeds_explain_what_they_can_and_no_more() -> None:
     problem = Problem(missing)
     base = problem.fit((), ())
     assert base is not None
-    assert np.sqrt(base.left / sum(e.count for e in missing)) > 1.4 * left[0.06]  # a crust is no error of the speed
+    assert np.sqrt(base.chi2 / sum(e.count for e in missing)) > 1.4 * left[0.06]  # a crust is no error of the speed
 
 
 def test_an_effect_is_fitted_better_beside_speeds_that_are_wrong(monkeypatch: pytest.MonkeyPatch) -> None:

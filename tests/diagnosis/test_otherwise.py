@@ -35,7 +35,7 @@ def begun(promised: float, gained: float) -> list[str]:
     """What is scanned where the shaped effect's slopes promised so much, of which its fit gained so much."""
     blocks = tuple(linear_blocks(np.random.default_rng(4), 2, 40, np.zeros(1)))
     base = Fitted(candidates=(), x=(), blocks=blocks)
-    left = base.left
+    left = base.chi2
 
     def fitted(c: Candidate, gain: float) -> Fitted:
         short = tuple(replace(b, residual=b.residual * np.sqrt(max(1.0 - gain / left, 0.0))) for b in blocks)
@@ -57,7 +57,7 @@ def begun(promised: float, gained: float) -> list[str]:
         score=40.0, scores={"mass": 40.0, "soil-adhesion": promised}, null=np.zeros(9), detectable={},
         starts={"soil-adhesion": ((0.7,),)},
     )  # fmt: skip
-    met = sorted([fitted(PLAIN, 10.0), fitted(SHAPED, gained)], key=lambda f: f.left)
+    met = sorted([fitted(PLAIN, 10.0), fitted(SHAPED, gained)], key=lambda f: f.chi2)
     assert from_other_starts(cast(Inquiry, inquiry), base, met, scored, (0.0, 0.0)) == met
     return asked
 
@@ -141,7 +141,7 @@ def test_a_time_shift_is_that_of_the_lowest_minimum() -> None:
     assert same is alike
     assert [(task.how, task.shifts) for task in asked] == [("time", tuple(problem.shifts))]
     assert abs(moved.blocks[1].shift - problem.shifts[1]) < 1e-4
-    assert moved.left < late.left
+    assert moved.chi2 < late.chi2
 
 
 def test_a_misled_fit_restarts_and_goes_on_if_it_soon_gains() -> None:
@@ -170,5 +170,5 @@ def test_a_misled_fit_restarts_and_goes_on_if_it_soon_gains() -> None:
     inquiry = cast(Inquiry, SimpleNamespace(fits=fits, problem=problem))
     scored = ScoreTest(score=1.0, scores={}, null=np.zeros(1), detectable={}, starts={"inertia": ((0.7,),)})
     found = _restarted_from_base(inquiry, base, [fitted("slope", 200.0, (0.5, 0.2)), *astray], scored)
-    assert [(f.candidates[-1].id, f.left) for f in found] == [("inertia", 250.0), ("air-drag", 310.0)]
+    assert [(f.candidates[-1].id, f.chi2) for f in found] == [("inertia", 250.0), ("air-drag", 310.0)]
     assert [j.start for j in asked] == [(0.5, 0.7), (0.5, 0.8), (0.5, 0.7)]

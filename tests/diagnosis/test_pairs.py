@@ -43,7 +43,7 @@ def fitted(candidates: tuple[Candidate, ...], times: float) -> Fitted:
 
 
 def screened(c: Candidate) -> Screened:
-    return Screened(candidate=c, starts=((0.3,),), left=1.0, potential=1.0)
+    return Screened(candidate=c, starts=((0.3,),), chi2=1.0, potential=1.0)
 
 
 def inquiry(asked: list[Any]) -> Inquiry:
@@ -225,8 +225,8 @@ def test_a_threshold_starts_where_it_helps_beside_the_other(ratio: float, lost: 
     assert led[0] is not None
     assert led[1] is not None
     count = sum(b.residual.size for b in led[0].blocks)
-    assert led[0].left < 1.1 * count
-    assert led[1].left > lost * count
+    assert led[0].chi2 < 1.1 * count
+    assert led[1].chi2 > lost * count
 
 
 def test_the_scan_point_of_least_misfit_beside_it_is_taken() -> None:
@@ -279,7 +279,7 @@ def test_a_pair_of_which_one_is_placed_beside_the_other() -> None:
     assert base is not None
     alone = [problem.fit((c,), x, shifts=[0.0] * 3) for c, x in ((stiffer, (0.5,)), (rate, (0.6,)))]
     led = [f for f in alone if f is not None]
-    lost = Screened(candidate=layer, starts=((0.05, 0.9),), left=9.0, potential=0.0)
+    lost = Screened(candidate=layer, starts=((0.05, 0.9),), chi2=9.0, potential=0.0)
     first = Step(base=base, fitted=led[0], p_value=0.0, rivals=tuple(led), screened=(lost,))
     scored = ScoreTest(score=9.0, scores={"soil-layer": 9.0}, null=np.zeros(9), detectable={})
     asking = Inquiry(
@@ -289,7 +289,7 @@ def test_a_pair_of_which_one_is_placed_beside_the_other() -> None:
     best = pairs.best_pair(asking, [first], scored)
     assert best is not None
     assert best.fitted.label == "soil-rate-hardening + soil-layer"
-    assert best.fitted.left < 1.1 * sum(b.residual.size for b in best.fitted.blocks)
+    assert best.fitted.chi2 < 1.1 * sum(b.residual.size for b in best.fitted.blocks)
     assert layer.values(best.fitted.own)["depth"] == pytest.approx(DEPTH, rel=0.05)
 
 

@@ -132,7 +132,7 @@ def test_a_fit_with_its_first_effect_last_is_the_same_fit() -> None:
     assert other.x == (0.3, 0.1, 0.2)
     assert np.array_equal(other.blocks[1].J[:, 0], fitted.blocks[1].J[:, 2])
     groups = [[0], [1], [2]]
-    assert held_out(other, groups).left == pytest.approx(held_out(fitted, groups).left, rel=1e-9)
+    assert held_out(other, groups).chi2 == pytest.approx(held_out(fitted, groups).chi2, rel=1e-9)
 
 
 def test_within_half_a_step_of_its_digits_nothing_has_moved() -> None:

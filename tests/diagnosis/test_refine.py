@@ -59,7 +59,7 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     count = sum(e.count for e in problem.dataset)
     led_astray = problem.fit((c,), (0.5625, 0.2), shifts=[0.0] * len(speeds))
     assert led_astray is not None
-    assert led_astray.left > 4.0 * count
+    assert led_astray.chi2 > 4.0 * count
     inquiry = Inquiry(
         problem=problem,
         candidates=[c],
@@ -70,7 +70,7 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     )
     scored = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
     (found,) = _damping_frequency_scan(inquiry, [led_astray], scored, [b.shift for b in led_astray.blocks])
-    assert found.left < 1.2 * count
+    assert found.chi2 < 1.2 * count
     assert c.values(found.x)["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
     assert c.values(found.x)["damping"] == pytest.approx(true["damping"], rel=0.1)
 
@@ -88,17 +88,17 @@ def test_a_misfitted_nose_is_found_by_its_ringing(
         (c,), coordinates({"stiffness": 6.4e6, "damping": 8000.0}, c.search), shifts=[0.0] * len(speeds)
     )
     assert astray is not None
-    assert astray.left > 10.0 * sum(e.count for e in problem.dataset)
+    assert astray.chi2 > 10.0 * sum(e.count for e in problem.dataset)
     inquiry = Inquiry(
         problem=problem, candidates=[c], groups=[[0], [1, 2]], phases=[], say=lambda _: None, executor=Executor()
     )
     scored = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
     (found,) = _damping_frequency_scan(inquiry, [astray], scored, [b.shift for b in astray.blocks])
-    assert found.left < 1.2 * sum(e.count for e in problem.dataset)
+    assert found.chi2 < 1.2 * sum(e.count for e in problem.dataset)
     assert found.candidates[-1].values(found.x) == pytest.approx(true, rel=0.01)
     monkeypatch.setattr(restarts, "_by_frequency", lambda *_: [])
     (near,) = _damping_frequency_scan(inquiry, [astray], scored, [b.shift for b in astray.blocks])
-    assert near.left > 10.0 * found.left
+    assert near.chi2 > 10.0 * found.chi2
 
 
 def test_the_clock_of_a_channel_is_followed_against_all_others(tmp_path: Path) -> None:
@@ -114,7 +114,7 @@ def test_the_clock_of_a_channel_is_followed_against_all_others(tmp_path: Path) -
     found = with_time_shift_search(problem, stopped)
     right = problem.fit((c,), (coordinate(truth["parameters"]["offset"], c.search["offset"]),), width=2)
     assert right is not None
-    assert found.left < right.left + 5.0 < stopped.left - 40.0
+    assert found.chi2 < right.chi2 + 5.0 < stopped.chi2 - 40.0
     assert c.values(found.x)["offset"] == pytest.approx(truth["parameters"]["offset"], abs=3e-5)
 
 
@@ -125,9 +125,9 @@ def test_a_fit_whose_rounds_were_too_few_is_gone_on_with() -> None:
     whole = problem.fit((c,), (0.62, 0.4), width=1)
     assert short is not None
     assert whole is not None
-    assert short.left > whole.left + 20.0
-    assert ended(problem, short).left < whole.left + 2.0
-    assert ended(problem, whole).left <= whole.left
+    assert short.chi2 > whole.chi2 + 20.0
+    assert ended(problem, short).chi2 < whole.chi2 + 2.0
+    assert ended(problem, whole).chi2 <= whole.chi2
 
 
 def test_a_nose_is_found_along_the_valley_of_its_frequency(tmp_path: Path) -> None:
@@ -139,10 +139,10 @@ def test_a_nose_is_found_along_the_valley_of_its_frequency(tmp_path: Path) -> No
     share = EFFECTS[c.id].reshaped(true, "nose_share", 0.1)
     plain = problem.fit((c,), [coordinate(share[name], s) for name, s in c.search.items()])
     assert plain is not None
-    assert plain.left > 4.0 * sum(e.count for e in problem.dataset)
+    assert plain.chi2 > 4.0 * sum(e.count for e in problem.dataset)
     found = with_fitted_shape(problem, plain, [b.total for b in plain.blocks])
     assert found is not None
-    assert found.left < 1.1 * sum(e.count for e in problem.dataset)
+    assert found.chi2 < 1.1 * sum(e.count for e in problem.dataset)
     assert found.candidates[-1].along == ()
     for name, told in intervals(problem, found)[0].items():
         assert told.low <= true[name] <= told.high
@@ -177,10 +177,10 @@ def test_the_share_of_an_unweighed_nose_is_found() -> None:
     begun = [coordinate(true[name], s) for name, s in c.search.items()]
     plain = problem.fit((c,), begun, shifts=[0.0] * 3)
     assert plain is not None
-    assert plain.left > 2.0 * count
+    assert plain.chi2 > 2.0 * count
     found = with_fitted_shape(problem, plain, [b.total for b in plain.blocks])
     assert found is not None
-    assert found.left < 1.1 * count
+    assert found.chi2 < 1.1 * count
     told = found.candidates[-1].values(found.x)
     assert told == {name: pytest.approx(value, rel=0.05) for name, value in true.items()}
     reweighted = scenario().replaced({"effects.structural-compliance": {"nose_share": 0.2, "stiffness": None}})
@@ -198,11 +198,11 @@ def test_a_threshold_is_found_though_a_fit_ended_at_another() -> None:
     ended = problem.fit((c,), begun, width=1)
     assert ended is not None
     assert abs(c.values(ended.x)["thickness"] - true["thickness"]) > 0.004
-    found = min((with_threshold_traced(problem, ended, s) for s in threshold_ranges(ended)), key=lambda f: f.left)
-    assert found.left < ended.left - 100.0
+    found = min((with_threshold_traced(problem, ended, s) for s in threshold_ranges(ended)), key=lambda f: f.chi2)
+    assert found.chi2 < ended.chi2 - 100.0
     assert c.values(found.x)["thickness"] == pytest.approx(true["thickness"], rel=0.01)
     assert c.values(found.x)["stiffness_ratio"] == pytest.approx(true["stiffness_ratio"], abs=0.001)
-    assert all(with_threshold_traced(problem, found, s).left <= found.left for s in threshold_ranges(found))
+    assert all(with_threshold_traced(problem, found, s).chi2 <= found.chi2 for s in threshold_ranges(found))
 
 
 def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
@@ -214,8 +214,8 @@ def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
     c = candidate(problem, f"sensor-clock-drift:{FORCE}")
     stopped = problem.fit((c,), (coordinate(truth["parameters"]["drift"] / 6.0, c.search["drift"]),), rounds=0)
     assert stopped is not None
-    found = min((with_threshold_traced(problem, stopped, s) for s in threshold_ranges(stopped)), key=lambda f: f.left)
-    assert found.left < 0.9 * stopped.left
+    found = min((with_threshold_traced(problem, stopped, s) for s in threshold_ranges(stopped)), key=lambda f: f.chi2)
+    assert found.chi2 < 0.9 * stopped.chi2
     assert c.values(found.x)["drift"] == pytest.approx(truth["parameters"]["drift"], rel=0.02)
 
 
@@ -230,8 +230,8 @@ def test_what_rings_is_traced_along_the_valley_of_its_frequency(tmp_path: Path) 
     bent, own = c.reshaped(x)
     assert bent.plain(own)[1] == pytest.approx(x)
     assert [k for k, _, _ in threshold_ranges(stopped)] == [2, 2]
-    found = min((with_threshold_traced(problem, stopped, s) for s in threshold_ranges(stopped)), key=lambda f: f.left)
-    assert found.left < stopped.left - 20.0
+    found = min((with_threshold_traced(problem, stopped, s) for s in threshold_ranges(stopped)), key=lambda f: f.chi2)
+    assert found.chi2 < stopped.chi2 - 20.0
     share = case.truth["effects"][0]["parameters"]["nose_share"]
     assert c.values(found.x)["nose_share"] == pytest.approx(share, rel=0.006)
 
@@ -283,7 +283,7 @@ def test_an_abrupt_effect_is_led_by_its_smooth_shape(tmp_path: Path) -> None:
         found = with_fitted_shape(problem, stuck, [b.total for b in stuck.blocks])
         assert found is not None
         assert found.candidates == (c,), "its usual shape"
-        gains.append(stuck.left - found.left)
+        gains.append(stuck.chi2 - found.chi2)
         for name, value in c.values(found.x).items():
             assert value == pytest.approx(true[name], rel=2e-3), name
     assert min(gains) >= 0.0
@@ -303,11 +303,11 @@ def test_two_effects_without_a_first_are_tried_together() -> None:
     beside = problem.fit((*stiffer.candidates, c["guide-friction"]), (*stiffer.x, *c["guide-friction"].starts()[0]))
     assert beside is not None
     count = sum(e.count for e in problem.dataset)
-    assert min(stiffer.left, heavier.left, beside.left) > 1.5 * count
+    assert min(stiffer.chi2, heavier.chi2, beside.chi2) > 1.5 * count
     first = Step(base=base, fitted=stiffer, p_value=0.0, rivals=(stiffer, heavier))
     then = Step(base=stiffer, fitted=beside, p_value=0.0, rivals=(beside,))
     scored = ScoreTest(score=9.0, scores={"guide-friction": 9.0}, null=np.zeros(9), detectable={})
-    guide = Screened(candidate=c["guide-friction"], starts=tuple(c["guide-friction"].starts()), left=9.0, potential=0.0)
+    guide = Screened(candidate=c["guide-friction"], starts=tuple(c["guide-friction"].starts()), chi2=9.0, potential=0.0)
     phases = [phases_of(e) for e in problem.dataset]
     inquiry = Inquiry(
         problem=problem, candidates=[*c.values()], groups=[], phases=phases, say=lambda _: None, executor=Executor()
@@ -321,7 +321,7 @@ def test_two_effects_without_a_first_are_tried_together() -> None:
     assert one.fitted.label == "mass"
     assert both.base is one.fitted
     assert both.fitted.label == "mass + guide-friction"
-    assert both.fitted.left < 1.1 * count
+    assert both.fitted.chi2 < 1.1 * count
     assert left.p_value > 0.01
     assert c["mass"].values(both.fitted.x[:1])["added"] == pytest.approx(2.3, rel=0.05)
     assert c["guide-friction"].values(both.fitted.x[1:])["force"] == pytest.approx(31.0, rel=0.05)
@@ -338,9 +338,9 @@ def test_a_fit_is_ended_finely_whatever_others_may_leave(monkeypatch: pytest.Mon
     assert usual is not None
     assert coarse is not None
     assert fine is not None
-    assert fine.left - 1e-6 < usual.left < fine.left + 1.0
-    assert coarse.left > fine.left + 1.0
-    assert ended(problem, coarse).left < fine.left + 0.05
+    assert fine.chi2 - 1e-6 < usual.chi2 < fine.chi2 + 1.0
+    assert coarse.chi2 > fine.chi2 + 1.0
+    assert ended(problem, coarse).chi2 < fine.chi2 + 0.05
 
 
 def test_a_start_that_soon_beats_the_fit_goes_on() -> None:

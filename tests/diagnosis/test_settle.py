@@ -368,4 +368,4 @@ def test_a_move_does_not_leap_to_another_course() -> None:
     assert base is not None
     found = refined_under_scatter(problem, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
     assert not 0.365 < found.fitted.x[0] < 0.385
-    assert found.fitted.left < problem.again(fitted).left
+    assert found.fitted.chi2 < problem.again(fitted).chi2

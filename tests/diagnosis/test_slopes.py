@@ -139,7 +139,7 @@ def test_a_rival_is_compared_with_equally_fixed_time_shifts() -> None:
 def leading(problem: Problem, base: Fitted, scores: Mapping[str, float]) -> set[str]:
     """Keys of what is worth a whole fit after first ones, for some scores."""
     scored = ScoreTest(score=9.0, scores=scores, null=np.zeros(4), detectable={})
-    screened = [Screened(candidate=c, starts=((0.02,),), left=1.0, potential=1.0) for c in (SLOPE, MASS)]
+    screened = [Screened(candidate=c, starts=((0.02,),), chi2=1.0, potential=1.0) for c in (SLOPE, MASS)]
     with Executor() as executor:
         inquiry = Inquiry(
             problem=problem, candidates=(SLOPE, MASS), groups=[], phases=[], say=lambda _: None, executor=executor

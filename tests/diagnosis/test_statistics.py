@@ -100,7 +100,7 @@ def test_linearised_cross_validation_equals_a_refit() -> None:
             w = b.residual - b.J @ dx
             both = np.append(b.slope, 1.0 / 0.3)
             tau = float(both[:-1] @ w) / float(both @ both)
-            assert held.left[r] == pytest.approx(float(np.sum((w - b.slope * tau) ** 2)) + (tau / 0.3) ** 2, rel=1e-9)
+            assert held.chi2[r] == pytest.approx(float(np.sum((w - b.slope * tau) ** 2)) + (tau / 0.3) ** 2, rel=1e-9)
 
 
 def test_null_of_the_best_is_that_of_simulated_noise() -> None:
@@ -162,7 +162,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
             ((name, value),) = held[0].fixed.items()
             k = list(candidate().search).index(name)
             d = coordinate(value, candidate().search[name]) - fitted.x[k]
-            return SimpleNamespace(left=fitted.left + d * d / np.linalg.inv(curved)[k, k])
+            return SimpleNamespace(chi2=fitted.chi2 + d * d / np.linalg.inv(curved)[k, k])
 
         problem.block, problem.fit = block, fit
         found = intervals(problem, fitted)[0]

@@ -193,5 +193,5 @@ def test_a_limit_starts_where_it_is_reached_despite_its_misfit() -> None:
     found = screen(inquiry, base, [limit], [0, 1], [0.0] * 4, scored)[0]
     nothing_yields = [x for x in limit.scan_points() if abs(x[0] - null) < 0.1]
     assert nothing_yields
-    assert found.left > sum(b.residual @ b.residual for b in blocks[:2])  # which is what these leave
+    assert found.chi2 > sum(b.residual @ b.residual for b in blocks[:2])  # which is what these leave
     assert found.starts == ((null + SETTINGS.fit.parameterisation.zero_step,), (gives_way,))

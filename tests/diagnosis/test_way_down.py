@@ -68,7 +68,7 @@ def taken(base: Fitted, found: Fitted) -> Taken:
     step = Step(base=base, fitted=found, p_value=0.0, rivals=(found,))
     left = Mismatch(p_value=0.0, cells=(), adjusted=())
     return Taken(
-        base=base, steps=(step,) if found.candidates else (), fitted=found, before=left, left=left, first=step,
+        base=base, steps=(step,) if found.candidates else (), fitted=found, before=left, chi2=left, first=step,
         at_first=cast(Any, None), scored=cast(Any, None),
     )  # fmt: skip
 
@@ -151,7 +151,7 @@ def test_holding_ground_moves_nothing_during_unloading(rig: dict[str, float], is
     assert base is not None
     phases = [drop_phases(e) for e in dataset]
     asking = Inquiry(problem=problem, candidates=(), groups=[], phases=phases, say=lambda _: None, executor=Executor())
-    beyond = base.left - sum(b.residual.size for b in base.blocks)
+    beyond = base.chi2 - sum(b.residual.size for b in base.blocks)
     moved = truncated_start.rebound_residual(asking, base)
     assert (
         moved > 0.1 * beyond if is_back else abs(moved) < 0.1 * SETTINGS.selection.truncated_start.least_share * beyond

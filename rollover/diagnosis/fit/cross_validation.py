@@ -28,27 +28,27 @@ TUNING = SETTINGS.fit.cross_validation
 
 @dataclass(frozen=True, kw_only=True)
 class Held:
-    """Held-out misfit: `left` (k,) sum of squares over the noise of each recording, `count` (k,) that noise leaves."""
+    """Held-out misfit: `chi2` (k,) sum of squares over the noise of each recording, `count` (k,) that noise leaves."""
 
-    left: Array
+    chi2: Array
     count: Array
 
     @property
     def nrmse(self) -> Array:
         """Root mean square over the noise, (k,): 1 is the noise itself."""
-        return np.asarray(np.sqrt(self.left / self.count))
+        return np.asarray(np.sqrt(self.chi2 / self.count))
 
     @property
     def total(self) -> float:
         """Root mean square over the noise of all together."""
-        return float(np.sqrt(self.left.sum() / self.count.sum()))
+        return float(np.sqrt(self.chi2.sum() / self.count.sum()))
 
 
 def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> Held:
     """Predict each group of recordings by a fit to all the others; one group alone, or what is in none, by its own."""
     count = np.array([b.size for b in fitted.blocks], dtype=float)
     if fitted.cross_validated is not None:
-        return Held(left=np.array(fitted.cross_validated), count=count)
+        return Held(chi2=np.array(fitted.cross_validated), count=count)
     normals = [b.normal() for b in fitted.blocks]
     left = np.array([max(c, 0.0) for _, _, c in normals])
     for group in groups:
@@ -57,7 +57,7 @@ def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> Held:
         for r in group:
             A, b, c = normals[r]
             left[r] = max(c - 2.0 * float(b @ dx) + float(dx @ A @ dx), 0.0)
-    return Held(left=left, count=count)
+    return Held(chi2=left, count=count)
 
 
 def cross_validated(problem: Problem, fitted: Fitted, groups: Sequence[Sequence[int]]) -> Fitted:
@@ -92,7 +92,7 @@ def cross_validated_by_refits(
     all there is.
     """
     count = sum(b.size for b in fitted.blocks)
-    doubted = min(TUNING.nonlinear_above * float(np.sqrt(fitted.left / count)), without)
+    doubted = min(TUNING.nonlinear_above * float(np.sqrt(fitted.chi2 / count)), without)
     if not fitted.x or len(groups) < 2 or held_out(fitted, groups).total < doubted:
         return fitted
     shifts = [b.shift for b in fitted.blocks]
@@ -137,19 +137,19 @@ def held_out_disadvantage(
     mean over conditions of ln(E_rival/E_best) in its paired standard errors. `shared` samples have one error in common.
     """
     a, b = held_out(rival, groups), held_out(best, groups)
-    dispersion = max(1.0, float(np.sqrt(b.left.sum() / b.count.sum())))
+    dispersion = max(1.0, float(np.sqrt(b.chi2.sum() / b.count.sum())))
     apart = np.zeros(len(best.blocks))
     for r, (x, y) in enumerate(zip(rival.blocks, best.blocks, strict=True)):
         d = y.counted(x.unweighted_residual - y.unweighted_residual)
         apart[r] = float(d @ d) - float(y.slope @ d) ** 2 / y.weight
     distance = float(apart.sum())
-    excess = float(a.left.sum() - b.left.sum())
+    excess = float(a.chi2.sum() - b.chi2.sum())
     if excess <= 0.0:
         return 0.0, 0.0
     first = excess / (2.0 * np.sqrt(max(distance, 1e-12) * shared) * dispersion)
     # conditions under which the two say the same decide nothing
     telling = [list(g) for g in groups if apart[list(g)].sum() > 9.0 * dispersion**2]
-    logs = np.array([0.5 * np.log(a.left[g].sum() / b.left[g].sum()) for g in telling])
+    logs = np.array([0.5 * np.log(a.chi2[g].sum() / b.chi2[g].sum()) for g in telling])
     if dispersion < TUNING.noise_alone or logs.size < 2:
         return float(first), float(first)
     error = float(np.std(logs, ddof=1) / np.sqrt(logs.size))

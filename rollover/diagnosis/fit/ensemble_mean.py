@@ -48,7 +48,7 @@ def fitted_to_ensemble_mean(problem: Problem, fitted: Fitted) -> Fitted:
             break
         dx = ensemble_mean_step(problem.dataset, here.blocks)
         if predicted_gain(here.blocks, dx) < max(
-            TUNING.least_gain, TUNING.least_gain_share * (here.left - sum(b.size for b in here.blocks))
+            TUNING.least_gain, TUNING.least_gain_share * (here.chi2 - sum(b.size for b in here.blocks))
         ):
             break
         there = _line_search(problem, here, np.clip(dx, -TUNING.longest_step, TUNING.longest_step))
@@ -110,12 +110,12 @@ def _line_search(problem: Problem, old: Fitted, dx: Array) -> tuple[Sequence[flo
         for x, shifts in begun:
             left, clocks = _misfit_and_shifts(problem, old.candidates, x, shifts)
             met.append((left, (x, clocks)))
-        if met[0][0] < old.left:
+        if met[0][0] < old.chi2:
             return met[0][1]
     least, best = min(met, key=lambda one: one[0])
-    if met[0][0] < TUNING.accepted_misfit * min(old.left, least):
+    if met[0][0] < TUNING.accepted_misfit * min(old.chi2, least):
         return met[0][1]
-    return best if least < old.left else None
+    return best if least < old.chi2 else None
 
 
 def _with_scatter_at(

@@ -83,7 +83,7 @@ def polish(problem: Problem, fitted: Fitted, size: float = 0.02, most: int = 45)
         left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": most, "xatol": 1e-4}
     )
     again = problem.fit(fitted.candidates, np.clip(found.x, 0.0, 1.0), rounds=3, shifts=shifts, width=2)
-    return again if again is not None and again.left < fitted.left else fitted
+    return again if again is not None and again.chi2 < fitted.chi2 else fitted
 
 
 def grid_scan(fitted: Fitted) -> list[tuple[float, ...]]:
@@ -164,7 +164,7 @@ def with_time_shift_search(problem: Problem, fitted: Fitted) -> Fitted:
         blocks = [b if b is None else _tried(problem, r, best.candidates, x, b) for r, b in enumerate(moved)]
         shifts = [s if b is None else b.shift for s, b in zip(shifts, blocks, strict=True)]
         again = problem.fit(best.candidates, x, rounds=3, shifts=shifts, width=2)
-        if again is None or again.left > best.left - TUNING.least_gain:
+        if again is None or again.chi2 > best.chi2 - TUNING.least_gain:
             break
         best = again
     return best
@@ -175,9 +175,9 @@ def ended(problem: Problem, fitted: Fitted) -> Fitted:
     best = fitted
     for _ in range(TUNING.repeats):
         again = problem.fit(best.candidates, best.x, shifts=[b.shift for b in best.blocks], width=2, finely=True)
-        if again is None or again.left > best.left:
+        if again is None or again.chi2 > best.chi2:
             break
-        is_there = again.left > best.left - TUNING.least_gain
+        is_there = again.chi2 > best.chi2 - TUNING.least_gain
         best = again
         if is_there:
             break

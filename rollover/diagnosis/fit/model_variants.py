@@ -34,12 +34,12 @@ def with_fitted_shape(problem: Problem, f: Fitted, leaves: Sequence[float]) -> F
     found = _best_from(problem, f, along, points, leaves)
     if found is None:
         return None
-    if found.left > f.left:  # the few led to where the others are not met: all of them, from where the fit stands
+    if found.chi2 > f.chi2:  # the few led to where the others are not met: all of them, from where the fit stands
         onward = problem.fit((*f.candidates[:-1], along), points[0], shifts=[b.shift for b in f.blocks])
-        found = min((one for one in (found, onward) if one is not None), key=lambda one: one.left)
-    if found.left > _extent_of_all(f, leaves):
+        found = min((one for one in (found, onward) if one is not None), key=lambda one: one.chi2)
+    if found.chi2 > _extent_of_all(f, leaves):
         return None
-    found = found if is_noise(found) or found.left > TUNING.no_ridge_above * sum(leaves) else polish(problem, found)
+    found = found if is_noise(found) or found.chi2 > TUNING.no_ridge_above * sum(leaves) else polish(problem, found)
     (whole, x), shifts = found.candidates[-1].plain(found.own), [b.shift for b in found.blocks]
     variant = problem.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
     own = dict(zip(found.candidates[-1].search, found.own, strict=True))
@@ -48,7 +48,7 @@ def with_fitted_shape(problem: Problem, f: Fitted, leaves: Sequence[float]) -> F
         return variant or usual
     return (
         usual
-        if usual.left < variant.left + enough(variant.left, sum(b.residual.size for b in variant.blocks))
+        if usual.chi2 < variant.chi2 + enough(variant.chi2, sum(b.residual.size for b in variant.blocks))
         else variant
     )
 
@@ -69,7 +69,7 @@ def as_variant(problem: Problem, f: Fitted, last: Candidate, leaves: Sequence[fl
     points = [(*f.x[:at], *own) for own in itertools.product(*axes)]
     met = ranked_by_misfit(problem, (*f.candidates[:-1], last), points, shifts, representative_recordings(f))
     found = _best_from(problem, f, last, met[: 2 * SETTINGS.fit.local_search.starts], leaves)
-    return found if found is not None and found.left < _extent_of_all(f, leaves) else None
+    return found if found is not None and found.chi2 < _extent_of_all(f, leaves) else None
 
 
 def enough(left: float, size: int) -> float:
@@ -79,7 +79,7 @@ def enough(left: float, size: int) -> float:
 
 def is_noise(fitted: Fitted) -> bool:
     """Whether a fit needs no further search."""
-    return fitted.left < SETTINGS.fit.levenberg_marquardt.noise_left**2 * sum(b.residual.size for b in fitted.blocks)
+    return fitted.chi2 < SETTINGS.fit.levenberg_marquardt.noise_left**2 * sum(b.residual.size for b in fitted.blocks)
 
 
 def _best_from(
@@ -128,12 +128,12 @@ def _best_from(
         if one.total > most:
             return best or one
         if any(_is_same_minimum(one, other, TUNING.meeting_distance) for other in done) or (
-            best and one.total > TUNING.followed_misfit * best.left
+            best and one.total > TUNING.followed_misfit * best.chi2
         ):
             continue
         done.append(one)
         ended = problem.fit(candidates, one.x, shifts=[b.shift for b in one.blocks])
-        best = min((f for f in (best, ended) if f is not None), key=lambda f: f.left, default=None)
+        best = min((f for f in (best, ended) if f is not None), key=lambda f: f.chi2, default=None)
         if best is not None and is_noise(best):
             break
     return best

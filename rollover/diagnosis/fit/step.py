@@ -23,7 +23,7 @@ class Screened:
 
     candidate: Candidate
     starts: tuple[tuple[float, ...], ...]
-    left: float
+    chi2: float
     potential: float
     nrmse: float = 0.0
 

@@ -105,7 +105,7 @@ def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) ->
             met.append((left, x))
     for x in _best_start(problem, fitted, _local_minima(met)[: TUNING.valleys], few):
         again = problem.fit(fitted.candidates, x, shifts=shifts, width=1)
-        best = again if again is not None and again.left < best.left else best
+        best = again if again is not None and again.chi2 < best.chi2 else best
     return best
 
 
@@ -136,7 +136,7 @@ def _along_frequency_ridge(problem: Problem, fitted: Fitted, stretch: Stretch) -
         if new is not None:
             plain = (*new.x[:at], *variant.plain(new.own)[1])
             again = problem.fit(fitted.candidates, plain, shifts=[b.shift for b in new.blocks], width=2)
-            best = again if again is not None and again.left < best.left else best
+            best = again if again is not None and again.chi2 < best.chi2 else best
     return best
 
 

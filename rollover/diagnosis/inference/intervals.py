@@ -204,11 +204,11 @@ def _along_ridge(
         found = problem.fit(held_at(fitted, k, at), x, rounds=TUNING.held_rounds, shifts=shifts, width=1)
         if found is None:
             break
-        if found.left - start > due:
+        if found.chi2 - start > due:
             low = min(max(inside[1], 0.0), due)
-            share = (np.sqrt(due) - np.sqrt(low)) / max(np.sqrt(found.left - start) - np.sqrt(low), 1e-9)
+            share = (np.sqrt(due) - np.sqrt(low)) / max(np.sqrt(found.chi2 - start) - np.sqrt(low), 1e-9)
             return float(inside[0] + share * (beyond - inside[0])) if low < due else inside[0]
-        inside, x, shifts = (beyond, found.left - start), list(found.x), [b.shift for b in found.blocks]
+        inside, x, shifts = (beyond, found.chi2 - start), list(found.x), [b.shift for b in found.blocks]
     return inside[0]
 
 
@@ -235,7 +235,7 @@ def _within_range(problem: Problem, fitted: Fitted, wide: Array, dispersion: flo
     def is_met(k: int, at: float) -> bool:
         others = [v for j, v in enumerate(fitted.x) if j != k]
         there = problem.fit(held_at(fitted, k, at), others, rounds=TUNING.held_rounds, shifts=shifts, width=1)
-        return there is None or there.left - fitted.left < due
+        return there is None or there.chi2 - fitted.chi2 < due
 
     for k, x in enumerate(fitted.x):
         for side, end in enumerate((0.0, 1.0)):
@@ -282,7 +282,7 @@ def _misfit(problem: Problem, fitted: Fitted, way: Array) -> float | None:
     moved = _clocked(problem, fitted, way)
     if moved is None:
         return None
-    return ensemble_mean_misfit(problem, moved)[0] if any(e.perturbed for e in problem.dataset) else moved.left
+    return ensemble_mean_misfit(problem, moved)[0] if any(e.perturbed for e in problem.dataset) else moved.chi2
 
 
 def _clocked(problem: Problem, fitted: Fitted, way: Array) -> Fitted | None:
@@ -328,7 +328,7 @@ def intervals(
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + np.diag(prior)
     inverse: Array = np.asarray(np.linalg.inv(A), dtype=np.float64)
     count = sum(b.residual.size for b in fitted.blocks)
-    dispersion = max(1.0, fitted.left / count) * problem.samples_per_error
+    dispersion = max(1.0, fitted.chi2 / count) * problem.samples_per_error
     strayed = any(e.perturbed for e in problem.dataset)
     noise = inverse @ _noise(problem, fitted, prior) @ inverse if strayed else inverse
     sd = np.sqrt(np.maximum(dispersion * np.diag(noise), 0.0))

@@ -271,4 +271,4 @@ def is_tolerated(problem: Problem, fitted: Fitted) -> bool:
     """
     rough = [e.model_error_dominates(s) for e in problem.dataset for s in e.signals]
     most = 1.0 + 2.0 * np.sqrt(2.0 / len(rough))
-    return all(rough) and bool(fitted.left < most * sum(b.residual.size for b in fitted.blocks))
+    return all(rough) and bool(fitted.chi2 < most * sum(b.residual.size for b in fitted.blocks))

@@ -26,7 +26,7 @@ GENTLE = SETTINGS.fit.linearisation.weak_prior
 def drawn(problem: Problem, fitted: Fitted, count: int, seed: int = 0) -> Draws:
     """`count` draws of all numbers of a fit that are fitted."""
     p, blocks = len(fitted.x), fitted.blocks
-    dispersion = max(1.0, fitted.left / sum(b.residual.size for b in blocks)) * problem.samples_per_error
+    dispersion = max(1.0, fitted.chi2 / sum(b.residual.size for b in blocks)) * problem.samples_per_error
     A = sum((b.normal()[0] for b in blocks), np.zeros((p, p))) + GENTLE * np.eye(p)
 
     def log_density(x: Array) -> float:

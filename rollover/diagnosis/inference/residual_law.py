@@ -94,7 +94,7 @@ def fitted_law(
 
 def gains_of(base: Fitted, fitted: Fitted, groups: Sequence[Sequence[int]]) -> Array:
     """Held-out gain ln(E_before/E_after) of each condition, (conditions,)."""
-    before, after = held_out(base, groups).left, held_out(fitted, groups).left
+    before, after = held_out(base, groups).chi2, held_out(fitted, groups).chi2
     return np.array([0.5 * np.log(before[list(g)].sum() / after[list(g)].sum()) for g in groups])
 
 

@@ -87,16 +87,16 @@ def begun(model: ForwardModel, problem: Problem) -> Fitted | None:
         (*start[:k], min(max(x + d, 0.0), 1.0), *start[k + 1 :]) for k, x in enumerate(start) for d in TUNING.beside
     ]
     short = [problem.fit(baseline, x, rounds=problem.effort.short, no_jacobian=True) for x in (start, *beside)]
-    best = min((f for f in short if f is not None), key=lambda f: f.left, default=None)
+    best = min((f for f in short if f is not None), key=lambda f: f.chi2, default=None)
     if best is None or not baseline:
         return best
     for _ in range(TUNING.repeats):
         again = problem.fit(baseline, best.x)
-        if again is None or again.left > best.left - TUNING.least_gain:
+        if again is None or again.chi2 > best.chi2 - TUNING.least_gain:
             break
         best = again
     alone = [problem.fit(baseline, best.x, only=[r]) for r in range(len(problem.dataset))]
-    met = min((f for f in alone if f is not None), key=lambda f: f.left / f.blocks[0].residual.size, default=best)
+    met = min((f for f in alone if f is not None), key=lambda f: f.chi2 / f.blocks[0].residual.size, default=best)
     placed = replace(baseline[0], points=tuple(dict.fromkeys([start, met.x])))
     return ended(problem, problem.again(replace(best, candidates=(placed,))))
 

@@ -40,7 +40,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     """
     problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
     found = loading_first(inquiry, forward_selection(inquiry, base))
-    base, taken, left, current = found.base, list(found.steps), found.left, found.fitted
+    base, taken, left, current = found.base, list(found.steps), found.after, found.fitted
     is_whole = is_enough(problem, current, left)
     is_open = not (problem.effort.is_ensemble or found.paired) and (not is_whole or len(taken) == MOST_EFFECTS)
     if found.first is not None and is_open:
@@ -161,9 +161,9 @@ def backward_elimination(problem: Problem, fitted: Fitted, base: Fitted | None =
         significant = significant_by_wald(problem, fitted) if problem.effort.is_ensemble else set()
         for k in {*range(fitted.first, len(fitted.candidates))} - significant:
             rest = _without_kth(problem, fitted, k, base)
-            losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
+            losses.append((rest.chi2 - fitted.chi2 if rest is not None else np.inf, k, rest))
         loss, _, rest = min(losses, key=lambda one: one[0])
-        dispersion = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
+        dispersion = max(1.0, fitted.chi2 / sum(b.residual.size for b in fitted.blocks))
         if rest is None or loss / dispersion > LEAST_GAIN:
             break
         fitted = problem.again(rest) if problem.effort.is_ensemble else rest
@@ -240,7 +240,7 @@ def redundant_effects(problem: Problem, found: Explanation, ids: Collection[str]
     if problem.effort.is_ensemble:
         return set(ids)
     fitted, done = found.fitted, set()
-    dispersion = problem.samples_per_error * max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
+    dispersion = problem.samples_per_error * max(1.0, fitted.chi2 / sum(b.residual.size for b in fitted.blocks))
     shifts = [b.shift for b in fitted.blocks]
     for k, c in enumerate(fitted.candidates):
         if c.id not in ids:
@@ -251,7 +251,7 @@ def redundant_effects(problem: Problem, found: Explanation, ids: Collection[str]
             for point in other.with_secondary(x) if other.secondary else ():
                 way = [*others[:j], (other.whole(), point), *others[j + 1 :]]
                 fits.append(problem.fit([o for o, _ in way], [v for _, at in way for v in at], shifts=shifts))
-        if min((f.left for f in fits if f is not None), default=np.inf) - fitted.left < LEAST_GAIN * dispersion:
+        if min((f.chi2 for f in fits if f is not None), default=np.inf) - fitted.chi2 < LEAST_GAIN * dispersion:
             done.add(c.id)
     return done
 

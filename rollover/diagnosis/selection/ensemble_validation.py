@@ -178,7 +178,7 @@ def is_shared(found: Step, groups: Groups) -> bool:
 def _gains(found: Step, groups: Groups) -> Array:
     """What each recording gains (k,) where it is held out, over what is left per sample."""
     with_, without_ = held_out(found.fitted, groups), held_out(found.base, groups)
-    return np.asarray((without_.left - with_.left) / max(1.0, float(with_.left.sum() / with_.count.sum())))
+    return np.asarray((without_.chi2 - with_.chi2) / max(1.0, float(with_.chi2.sum() / with_.count.sum())))
 
 
 def refined_under_scatter(problem: Problem, step: Step) -> Step:

@@ -82,8 +82,8 @@ def strongest(problem: Problem, base: Fitted, fitted: Fitted) -> Candidate:
             left = left_at(problem, others, [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks])
         else:
             rest = without_effect(problem, fitted, k, rounds=4)
-            left = rest.left if rest is not None else None
-        left = base.left if left is None else left
+            left = rest.chi2 if rest is not None else None
+        left = base.chi2 if left is None else left
         if left > loss:
             best, loss = c, left
     return best

@@ -69,15 +69,15 @@ def step(inquiry: Inquiry, base: Fitted, scored: ScoreTest) -> Step | None:
         return None
     if base.candidates and not problem.effort.is_ensemble:
         fits += _restarted_from_base(inquiry, base, fits, scored)
-    fits.sort(key=lambda f: f.left)
+    fits.sort(key=lambda f: f.chi2)
     if not problem.effort.is_ensemble:
         fits = from_other_starts(inquiry, base, fits, scored, shifts)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
-    able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < TUNING.polished_misfit * fits[0].left]
+    able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.chi2 < TUNING.polished_misfit * fits[0].chi2]
     alone = [f for f in able[:1] if f is fits[0] and not base.effects]
     near = (
         able[: problem.effort.polishes]
-        if fits[0].left > SETTINGS.fit.levenberg_marquardt.noise_left**2 * count
+        if fits[0].chi2 > SETTINGS.fit.levenberg_marquardt.noise_left**2 * count
         else alone
     )
     if near and problem.effort.polishes:
@@ -95,7 +95,7 @@ def step(inquiry: Inquiry, base: Fitted, scored: ScoreTest) -> Step | None:
         base, fits = problem.again(base), [problem.again(f) for f in fits]
     if not problem.effort.is_ensemble:
         fits = _refitted_where_slopes_mislead(inquiry, fits)
-    fits.sort(key=lambda f: held_out(f, groups).left.sum())
+    fits.sort(key=lambda f: held_out(f, groups).chi2.sum())
     fits = simplest(fits, groups, problem.samples_per_error)
     p = by_chance(base, fits, scored, problem.samples_per_error)
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
@@ -103,13 +103,13 @@ def step(inquiry: Inquiry, base: Fitted, scored: ScoreTest) -> Step | None:
 
 def by_chance(base: Fitted, fits: Sequence[Fitted], scored: ScoreTest, shared: float) -> float:
     """p-value of what the best of all fits gains, where `shared` samples have one error."""
-    least = min(f.left for f in fits)
+    least = min(f.chi2 for f in fits)
     # what even the best leaves is no chance of the noise's size
     dispersion = max(1.0, least / sum(b.residual.size for b in base.blocks))
     score = scored.score
     if shared > 1.0:
         # beside a tolerance what is missing is large, and a fit finds more of it than its slope where it is not
-        dispersion, score = dispersion * shared, max(score, base.left - least)
+        dispersion, score = dispersion * shared, max(score, base.chi2 - least)
     return p_value(score / dispersion, scored.null)
 
 
@@ -123,7 +123,7 @@ def reusable_slopes(problem: Problem, base: Fitted, few: Sequence[int] | None = 
 def _refitted_where_slopes_mislead(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits, with what the one that leaves least foretells by fits, where by its slopes another foretells better."""
     groups = inquiry.groups
-    lead, ahead = min(fits, key=lambda f: f.left), min(fits, key=lambda f: held_out(f, groups).left.sum())
+    lead, ahead = min(fits, key=lambda f: f.chi2), min(fits, key=lambda f: held_out(f, groups).chi2.sum())
     if lead is ahead:
         return list(fits)
     new = cross_validated_by_refits(
@@ -137,22 +137,22 @@ def _restarted_from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted],
 
     Those that soon gain a part of what the best does are gone on with.
     """
-    tasks, least, shifts = [], min(f.left for f in fits), tuple(b.shift for b in base.blocks)
+    tasks, least, shifts = [], min(f.chi2 for f in fits), tuple(b.shift for b in base.blocks)
     for f in fits:
-        if f.left > base.left:
+        if f.chi2 > base.chi2:
             begin = scored.starts.get(f.candidates[-1].key, (f.own,))[0]
             tasks.append(
                 Task(candidates=f.candidates, start=(*base.x, *begin), shifts=shifts, rounds=TUNING.short_rounds)
             )
     short = [f for f in inquiry.fits(tasks) if f is not None]
-    able = [f for f in short if base.left - f.total > TUNING.short_share * (base.left - least)]
+    able = [f for f in short if base.chi2 - f.total > TUNING.short_share * (base.chi2 - least)]
     ended = [f for f in inquiry.fits([continued_from(f, "fit") for f in able]) if f is not None]
     return ended + [inquiry.problem.again(f) for f in short if not any(f is one for one in able)]
 
 
 def with_noise_of_fit(problem: Problem, fitted: Fitted, phases: Phases) -> bool:
     """Weigh the recordings by all that a fit leaves, if that is noise: as little as seen, or more without structure."""
-    left, count = fitted.left, sum(b.residual.size for b in fitted.blocks)
+    left, count = fitted.chi2, sum(b.residual.size for b in fitted.blocks)
     if left > TUNING.like_noise**2 * count:
         return False
     before = problem.dataset
@@ -197,10 +197,10 @@ def _first_fits(
     fits += _robust_short_fits(inquiry, far, few)
     for one in fits:
         key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
-        nrmse_by_key[key] = min(nrmse_by_key.get(key, np.inf), float(np.sqrt(one.left / size)))
-    fits.sort(key=lambda f: f.left)
+        nrmse_by_key[key] = min(nrmse_by_key.get(key, np.inf), float(np.sqrt(one.chi2 / size)))
+    fits.sort(key=lambda f: f.chi2)
     worth = [
-        f for k, f in enumerate(fits) if k < problem.effort.leaders or f.left < TUNING.followed_misfit * fits[0].left
+        f for k, f in enumerate(fits) if k < problem.effort.leaders or f.chi2 < TUNING.followed_misfit * fits[0].chi2
     ]
     if problem.effort.is_ensemble and fits:
         worth = best_of_each(worth) + _other_minimum(worth)
@@ -210,7 +210,7 @@ def _first_fits(
         worth = [
             f
             for f in worth
-            if as_it_is - f.left >= TUNING.rival_share * (as_it_is - fits[0].left)
+            if as_it_is - f.chi2 >= TUNING.rival_share * (as_it_is - fits[0].chi2)
             or f.candidates[-1].key == scored.best
         ]
     worth = worth[: problem.effort.most_leaders]
@@ -251,7 +251,7 @@ def _chosen(screened: Sequence[Screened], effort: Effort, scored: ScoreTest) -> 
     none: as many more. A part that gives way looks like several sensors at the end of their ranges, and scores less
     than each: the two are compared with their own kind. With a leader comes its family.
     """
-    by_start = sorted(screened, key=lambda s: s.left)[: effort.promising // 2]
+    by_start = sorted(screened, key=lambda s: s.chi2)[: effort.promising // 2]
     if not effort.is_ensemble:
         return [*by_start, *sorted(screened, key=lambda s: -s.potential)[: effort.promising]]
     by_key = {s.candidate.key: s for s in screened}
@@ -321,15 +321,15 @@ def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitt
     Hardly worse: within a standard error, or within what jumps make the misfit rough by. Of those that are one and the
     same to these recordings the one leads that asks for the more usual strength. `shared` samples have one error.
     """
-    least = held_out(fits[0], groups).left.sum()
+    least = held_out(fits[0], groups).chi2.sum()
     near = [
         f
         for f in fits
         if held_out_disadvantage(f, fits[0], groups, shared)[0] < TUNING.simpler_errors
-        or held_out(f, groups).left.sum() < (1.0 + TUNING.roughness) * least
+        or held_out(f, groups).chi2.sum() < (1.0 + TUNING.roughness) * least
     ]
     first = min(near, key=lambda f: len(f.x))
-    twins = [f for f in near if len(f.x) == len(first.x) and abs(f.left - first.left) < TUNING.same_misfit]
+    twins = [f for f in near if len(f.x) == len(first.x) and abs(f.chi2 - first.chi2) < TUNING.same_misfit]
     first = min(twins, key=lambda f: f.candidates[-1].strength(f.own))
     return [first, *(f for f in fits if f is not first)]
 
@@ -344,10 +344,10 @@ def confusion_set(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitt
     best, base = step_.fitted, step_.base
     found = [best]
     for rival in step_.rivals:
-        explains = base.left - rival.left > 0.5 * (base.left - best.left)
-        as_well = len(rival.x) <= len(best.x) and rival.left < best.left + TUNING.excluded_errors**2
+        explains = base.chi2 - rival.chi2 > 0.5 * (base.chi2 - best.chi2)
+        as_well = len(rival.x) <= len(best.x) and rival.chi2 < best.chi2 + TUNING.excluded_errors**2
         becomes_best = (
-            len(rival.x) > len(best.x) and rival.left > best.left - TUNING.excluded_errors**2 and is_at_bound(rival)
+            len(rival.x) > len(best.x) and rival.chi2 > best.chi2 - TUNING.excluded_errors**2 and is_at_bound(rival)
         )
         if rival is best or becomes_best or not explains:
             continue

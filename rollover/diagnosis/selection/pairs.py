@@ -53,7 +53,7 @@ def best_subsets(
             else problem.again(first_effect_last(found.fitted))
         )
         other = with_first_replaced(inquiry, ringing)
-        if other is not None and other.fitted.left < found.fitted.left:
+        if other is not None and other.fitted.chi2 < found.fitted.chi2:
             found, left = followed(inquiry, other)
     if is_whole and costs(problem, found.fitted, current) > SETTINGS.selection.ensemble_validation.least_gain:
         return None  # noise that such a pair tells of would hold the third effect
@@ -70,8 +70,8 @@ def best_subsets(
 
 def costs(problem: Problem, fewer: Fitted, more: Fitted) -> float:
     """What a fit of fewer effects leaves more than one of more, over what that leaves per sample."""
-    left = problem.again(more).left
-    return (fewer.left - left) / max(1.0, left / sum(b.residual.size for b in more.blocks))
+    left = problem.again(more).chi2
+    return (fewer.chi2 - left) / max(1.0, left / sum(b.residual.size for b in more.blocks))
 
 
 def is_better(other: Fitted, left: Mismatch, current: Fitted, *, scattered: bool = False) -> bool:
@@ -81,12 +81,12 @@ def is_better(other: Fitted, left: Mismatch, current: Fitted, *, scattered: bool
     Instead of any curve, which will be refused, as much more will do.
     """
     if left.p_value > SETTINGS.inference.lack_of_fit.p_value:
-        return other.left < current.left
+        return other.chi2 < current.chi2
     if scattered:
-        return other.left < TUNING.better_share * current.left
+        return other.chi2 < TUNING.better_share * current.chi2
     chance = sum(b.residual.size for b in other.blocks)
     part = 1.0 / TUNING.better_share if is_over_flexible(current.effects) else TUNING.better_share
-    return other.left - chance < part * (current.left - chance)
+    return other.chi2 - chance < part * (current.chi2 - chance)
 
 
 def with_first_exchanged(
@@ -94,7 +94,7 @@ def with_first_exchanged(
 ) -> tuple[list[Step], Mismatch] | None:
     """Two steps with the first effect given for another beside the second, and what they leave; None if not better."""
     other = with_first_replaced(inquiry, taken[-1].fitted)
-    if other is None or other.fitted.left >= taken[-1].fitted.left:
+    if other is None or other.fitted.chi2 >= taken[-1].fitted.chi2:
         return None
     found, left = followed(inquiry, other)
     return ([taken[-1], found], left) if is_better(found.fitted, left, current, scattered=True) else None
@@ -112,7 +112,7 @@ def with_first_replaced(inquiry: Inquiry, current: Fitted) -> Step | None:
     found = step(inquiry, rest, scored)
     held = problem.again(first_effect_last(current))
     if (
-        found is None or found.fitted.left > held.left + SETTINGS.selection.ensemble_validation.least_gain
+        found is None or found.fitted.chi2 > held.chi2 + SETTINGS.selection.ensemble_validation.least_gain
     ):  # on the way back nothing came as far
         rivals = () if found is None else found.rivals
         beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
@@ -128,7 +128,7 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], scored: ScoreTest) -> Ste
     fits tell which pairs are worth whole ones; the best takes the shapes that pay if it comes near what others leave.
     """
     problem, first = inquiry.problem, taken[0]
-    lead = min(first.rivals, key=lambda f: f.left)
+    lead = min(first.rivals, key=lambda f: f.chi2)
     few, shifts = representative_recordings(lead), tuple(b.shift for b in lead.blocks)
     at, fixed_shifts = tuple(shifts[r] for r in few), is_far(problem, first.base)
     # slopes tell what two do together where these are not far off
@@ -147,7 +147,7 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], scored: ScoreTest) -> Ste
             Task(candidates=both, start=x, shifts=at, only=tuple(few), rounds=rounds, fixed_shifts=fixed_shifts)
             for both, x in short
         ]
-        met = sorted((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.left)[:most]
+        met = sorted((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.chi2)[:most]
         short = [(f.candidates, f.x) for f in met]
     if not met or _explains_little(problem.again(lead), met[0], few):
         return None
@@ -155,14 +155,14 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], scored: ScoreTest) -> Ste
     fits = [f for f in inquiry.fits(tasks) if f is not None]
     if not fits:
         return None
-    best = min([*fits, *_with_secondary_fitted(inquiry, fits), *_traced(inquiry, fits)], key=lambda f: f.left)
-    best = min([best, *_mirrored(inquiry, best)], key=lambda f: f.left)
-    if best.left < SETTINGS.fit.local_search.abandon_above * taken[-1].fitted.left:
+    best = min([*fits, *_with_secondary_fitted(inquiry, fits), *_traced(inquiry, fits)], key=lambda f: f.chi2)
+    best = min([best, *_mirrored(inquiry, best)], key=lambda f: f.chi2)
+    if best.chi2 < SETTINGS.fit.local_search.abandon_above * taken[-1].fitted.chi2:
         ways = (best, problem.again(first_effect_last(best)))
         tasks = [Task(candidates=p.candidates[:-1], start=p.x[: -len(p.own)], shifts=shifts) for p in ways]
         for pair, alone in zip(ways, inquiry.fits(tasks), strict=True):
             if alone is not None:
-                best = min(best, *with_secondary_parameters(inquiry, alone, [pair]), key=lambda f: f.left)
+                best = min(best, *with_secondary_parameters(inquiry, alone, [pair]), key=lambda f: f.chi2)
     alone = problem.fit(best.candidates[:-1], best.x[: -len(best.own)], shifts=[b.shift for b in best.blocks])
     return None if alone is None else Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
 
@@ -219,8 +219,8 @@ def _with_secondary_fitted(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fi
         for f in pairs
         if _is_oscillatory(f)
     ]
-    lead = min(pairs, key=lambda f: f.left)
-    near = [f for f in able if f.left < TUNING.same_misfit * lead.left and f.candidates[-1].secondary]
+    lead = min(pairs, key=lambda f: f.chi2)
+    near = [f for f in able if f.chi2 < TUNING.same_misfit * lead.chi2 and f.candidates[-1].secondary]
     leaves = tuple(b.total for b in lead.blocks)
     made = inquiry.fits([replace(continued_from(f, "shape"), leaves=leaves) for f in near])
     return [f for f in made if f is not None]
@@ -231,13 +231,13 @@ def _traced(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
 
     None where the best leaves no more than noise.
     """
-    ranked = sorted(pairs, key=lambda f: f.left)
+    ranked = sorted(pairs, key=lambda f: f.chi2)
     if (
         mismatch_of(inquiry.problem.dataset, ranked[0].blocks, inquiry.phases).p_value
         > SETTINGS.inference.lack_of_fit.p_value
     ):
         return []
-    near = (f for f in ranked if f.left < TUNING.placed_misfit * ranked[0].left)
+    near = (f for f in ranked if f.chi2 < TUNING.placed_misfit * ranked[0].chi2)
     ways = (way for f in near for way in (f, inquiry.problem.again(first_effect_last(f))))
     able = itertools.islice(
         (way for way in ways if threshold_ranges(way) and not way.candidates[-1].is_oscillatory), TUNING.placed
@@ -274,8 +274,8 @@ def _partners(
 
     Those that led, and of the others the first `count` by their score.
     """
-    leading = sorted((inquiry.problem.again(f) for f in first.rivals), key=lambda f: f.left)[: TUNING.leading]
-    later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[: TUNING.following]]
+    leading = sorted((inquiry.problem.again(f) for f in first.rivals), key=lambda f: f.chi2)[: TUNING.leading]
+    later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.chi2)[: TUNING.following]]
     found: dict[tuple[str, bool], tuple[Candidate, tuple[float, ...]]] = {}
     for f in (*leading, *later):
         last = f.candidates[-1]

@@ -38,7 +38,7 @@ def from_other_starts(
 ) -> list[Fitted]:
     """The fits, best first; those that gained little are begun again from other starts and with other shapes."""
     count = sum(b.residual.size for b in base.blocks)
-    if fits[0].left > TUNING.rugged_above**2 * count:
+    if fits[0].chi2 > TUNING.rugged_above**2 * count:
         return _refit_on_few(inquiry, base, _damping_frequency_scan(inquiry, fits, scored, shifts), scored, shifts)
     return _recheck_promising(inquiry, base, fits, scored, shifts)
 
@@ -47,7 +47,7 @@ def _recheck_promising(
     inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], scored: ScoreTest, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first, with those whose slopes lead and whose usual shape does not bear them out."""
-    gains = {f.candidates[-1].key: base.left - f.left for f in best_of_each(fits)}
+    gains = {f.candidates[-1].key: base.chi2 - f.chi2 for f in best_of_each(fits)}
     points = []
     for c in (c for c in inquiry.free(base) if c.secondary):
         score = scored.scores.get(c.key, 0.0)
@@ -66,7 +66,7 @@ def _damping_frequency_scan(
 
     It leads by what it leaves, or by its score: its frequency may have been found beside a wrong damping.
     """
-    near = [f for f in fits if f.left < TUNING.leading_misfit * fits[0].left or f.candidates[-1].key == scored.best]
+    near = [f for f in fits if f.chi2 < TUNING.leading_misfit * fits[0].chi2 or f.candidates[-1].key == scored.best]
     old = next((f for f in near if f.candidates[-1].is_oscillatory and len(f.own) == 2), None)
     if old is None:
         return list(fits)
@@ -80,8 +80,8 @@ def _damping_frequency_scan(
     new = _fewest_parameters([f for f in made if f is not None] or [old], sum(b.residual.size for b in old.blocks))
     for how in FOLLOWED:
         new = inquiry.fits([continued_from(new, how)])[0] or new
-    better = new if new.left < old.left else old
-    return sorted([better, *(f for f in fits if f is not old)], key=lambda f: f.left)
+    better = new if new.chi2 < old.chi2 else old
+    return sorted([better, *(f for f in fits if f is not old)], key=lambda f: f.chi2)
 
 
 def _by_frequency(
@@ -165,10 +165,10 @@ def _with_shape_starts(
         if least is not None:
             tasks.append(Task(candidates=candidates, start=least[1], shifts=tuple(shifts), width=1))
     begun = [f for f in inquiry.fits(tasks) if f is not None]
-    near = [f for f in begun if f.left <= SETTINGS.fit.local_search.abandon_above * fits[0].left]
+    near = [f for f in begun if f.chi2 <= SETTINGS.fit.local_search.abandon_above * fits[0].chi2]
     followed = zip(inquiry.fits([continued_from(f, "polish") for f in near]), near, strict=True)
     others = [f for f in begun if not any(f is one for one in near)]
-    return sorted([*fits, *others, *(new or old for new, old in followed)], key=lambda f: f.left)
+    return sorted([*fits, *others, *(new or old for new, old in followed)], key=lambda f: f.chi2)
 
 
 def _best_middle(
@@ -217,14 +217,14 @@ def with_secondary_parameters(inquiry: Inquiry, base: Fitted, fits: Sequence[Fit
 
     Of an effect that takes next to nothing from what the base leaves no shape or form will take it all.
     """
-    lead = min(fits, key=lambda f: f.left)
-    best, size = lead.left, sum(b.residual.size for b in fits[0].blocks)
+    lead = min(fits, key=lambda f: f.chi2)
+    best, size = lead.chi2, sum(b.residual.size for b in fits[0].blocks)
     held = [held_out(f, inquiry.groups).total ** 2 for f in fits]
     is_whole = mismatch_of(inquiry.problem.dataset, lead.blocks, inquiry.phases).p_value > TUNING.chance_p_value
     ways: list[tuple[int, Task]] = []
     for k, (f, ahead) in enumerate(zip(fits, held, strict=True)):
-        is_near = f.left < TUNING.shaped_misfit * best or ahead < TUNING.shaped_misfit * min(held)
-        if not is_near or base.left - f.left < TUNING.least_share * (base.left - size):
+        is_near = f.chi2 < TUNING.shaped_misfit * best or ahead < TUNING.shaped_misfit * min(held)
+        if not is_near or base.chi2 - f.chi2 < TUNING.least_share * (base.chi2 - size):
             continue
         tasks = [continued_from(f, "shape")] if f.candidates[-1].secondary else []
         tasks += (
@@ -238,18 +238,18 @@ def with_secondary_parameters(inquiry: Inquiry, base: Fitted, fits: Sequence[Fit
     found = list(fits)
     for k, several in made.items():
         new = _fewest_parameters(several, size)
-        if new.left < fits[k].left - enough(best, size):
+        if new.chi2 < fits[k].chi2 - enough(best, size):
             found[k] = new
-    return sorted(found, key=lambda f: f.left)
+    return sorted(found, key=lambda f: f.chi2)
 
 
 def _polished(inquiry: Inquiry, fits: Sequence[Fitted | None], best: float) -> list[Fitted | None]:
     """Fits, those in another form that come near the best of all and leave more than noise followed on."""
-    least = min([best, *(f.left for f in fits if f is not None)])
+    least = min([best, *(f.chi2 for f in fits if f is not None)])
     near = [
         f
         for f in fits
-        if f is not None and f.candidates[-1].variant and f.left < TUNING.leading_misfit * least and not is_noise(f)
+        if f is not None and f.candidates[-1].variant and f.chi2 < TUNING.leading_misfit * least and not is_noise(f)
     ]
     followed = inquiry.fits([continued_from(f, "polish") for f in near])
     better = {id(old): new for old, new in zip(near, followed, strict=True)}
@@ -258,9 +258,9 @@ def _polished(inquiry: Inquiry, fits: Sequence[Fitted | None], best: float) -> l
 
 def _fewest_parameters(fits: Sequence[Fitted], size: int) -> Fitted:
     """Of an effect in several forms the one that asks for least, of those that meet all as well."""
-    least = min(f.left for f in fits)
-    near = [f for f in fits if f.left < least + enough(least, size)]
-    return min(near, key=lambda f: (len(f.x), bool(f.candidates[-1].variant), f.left))
+    least = min(f.chi2 for f in fits)
+    near = [f for f in fits if f.chi2 < least + enough(least, size)]
+    return min(near, key=lambda f: (len(f.x), bool(f.candidates[-1].variant), f.chi2))
 
 
 def with_time_shifts(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
@@ -268,16 +268,16 @@ def with_time_shifts(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> 
 
     Beside what is hardly met at all everything is near: an effect must gain a share of what the best does.
     """
-    least = min(f.left for f in fits)
+    least = min(f.chi2 for f in fits)
     near = [
         f
         for f in fits
-        if f.left < TUNING.tied_misfit * least and base.left - f.left >= TUNING.least_share * (base.left - least)
+        if f.chi2 < TUNING.tied_misfit * least and base.chi2 - f.chi2 >= TUNING.least_share * (base.chi2 - least)
     ]
     others = [f for f in fits if not any(f is one for one in near)]
     traced = [with_thresholds_traced(inquiry, f) if is_clock(f) else f for f in near]
     timed = [new or f for new, f in zip(inquiry.fits([continued_from(f, "time") for f in traced]), traced, strict=True)]
-    return sorted(with_common_time_shifts(inquiry, timed) + others, key=lambda f: f.left)
+    return sorted(with_common_time_shifts(inquiry, timed) + others, key=lambda f: f.chi2)
 
 
 def with_common_time_shifts(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
@@ -287,11 +287,11 @@ def with_common_time_shifts(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fi
     """
     if len(fits) < 2:
         return list(fits)
-    lead = min(fits, key=lambda f: f.left)
+    lead = min(fits, key=lambda f: f.chi2)
     shifts = [_shifts_beside(inquiry.problem, f, lead) for f in fits]
     tasks = {k: replace(continued_from(fits[k], "time"), shifts=s) for k, s in enumerate(shifts) if s is not None}
     found = dict(zip(tasks, inquiry.fits(list(tasks.values())), strict=True))
-    return [min((f, found.get(k) or f), key=lambda one: one.left) for k, f in enumerate(fits)]
+    return [min((f, found.get(k) or f), key=lambda one: one.chi2) for k, f in enumerate(fits)]
 
 
 def _shifts_beside(problem: Problem, fitted: Fitted, lead: Fitted) -> tuple[float, ...] | None:
@@ -308,7 +308,7 @@ def _shifts_beside(problem: Problem, fitted: Fitted, lead: Fitted) -> tuple[floa
 def with_thresholds_traced(inquiry: Inquiry, fitted: Fitted) -> Fitted:
     """The fit, or a better one begun where a threshold of its last effect lies elsewhere."""
     begun = inquiry.fits([replace(continued_from(fitted, "trace"), stretch=s) for s in threshold_ranges(fitted)])
-    return min([fitted, *(f for f in begun if f is not None)], key=lambda f: f.left)
+    return min([fitted, *(f for f in begun if f is not None)], key=lambda f: f.chi2)
 
 
 def continued_from(f: Fitted, how: How) -> Task:
@@ -319,6 +319,6 @@ def continued_from(f: Fitted, how: How) -> Task:
 def best_of_each(fits: Sequence[Fitted]) -> list[Fitted]:
     """The best fit of each candidate."""
     best: dict[str, Fitted] = {}
-    for f in sorted(fits, key=lambda f: f.left):
+    for f in sorted(fits, key=lambda f: f.chi2):
         best.setdefault(f.candidates[-1].key, f)
     return list(best.values())

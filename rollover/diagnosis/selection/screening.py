@@ -37,7 +37,7 @@ def representative_few(
 def is_far(problem: Problem, base: Fitted) -> bool:
     """Whether a base is so far off that its time shifts tell of what is missing; beside a tolerance that is soon."""
     far = TUNING.fixed_shifts if problem.samples_per_error == 1.0 else 1.0
-    return base.left > far**2 * sum(b.residual.size for b in base.blocks)
+    return base.chi2 > far**2 * sum(b.residual.size for b in base.blocks)
 
 
 def initial_time_shifts(problem: Problem, base: Fitted, parallel_map: ParallelMap[Problem] = serial_map) -> list[float]:
@@ -50,7 +50,7 @@ def initial_time_shifts(problem: Problem, base: Fitted, parallel_map: ParallelMa
         contact_shifts: list[float | None] = [None] * len(base.blocks)
         if not problem.effort.is_ensemble and not is_far(problem, base):
             return [b.shift for b in base.blocks]
-    elif base.left < TUNING.biased_shifts**2 * count:
+    elif base.chi2 < TUNING.biased_shifts**2 * count:
         return [b.shift for b in base.blocks]
     else:
         contact_shifts = shifts_from_contact(problem, base.candidates, base.x, parallel_map)
@@ -136,7 +136,7 @@ def _screened(
     # a fit finds no way from where nothing moves, however little less is left there than where too much does
     met = [(left, start) for _, left, start in sorted(looked_at)]
     starts = tuple(dict.fromkeys((*item.far, *_begun_at(c, met))))
-    return Screened(candidate=c, starts=starts, left=met[0][0], potential=potential)
+    return Screened(candidate=c, starts=starts, chi2=met[0][0], potential=potential)
 
 
 def of_same_family(ranked: Sequence[Candidate], taken: int, leaders: int) -> list[Candidate]:

@@ -47,7 +47,7 @@ class Taken:
     steps: tuple[Step, ...]
     fitted: Fitted
     before: Mismatch
-    left: Mismatch
+    after: Mismatch
     first: Step | None
     at_first: ScoreTest
     scored: ScoreTest
@@ -119,7 +119,7 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
             other = None
             if pairs and not problem.effort.is_ensemble:
                 other, paired = best_subsets(inquiry, taken, first_scored, current), True
-            elif problem.effort.is_ensemble and current.left - count < TUNING.hopeless_share * (base.left - count):
+            elif problem.effort.is_ensemble and current.chi2 - count < TUNING.hopeless_share * (base.chi2 - count):
                 other = with_first_exchanged(inquiry, taken, current)
             if other is not None:
                 (taken, left), current = other, other[0][-1].fitted
@@ -137,7 +137,7 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
         steps=tuple(taken),
         fitted=current,
         before=before,
-        left=left,
+        after=left,
         first=first,
         at_first=first_scored,
         scored=scored,
@@ -149,13 +149,13 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
 def is_hopeless(problem: Problem, base: Fitted, current: Fitted) -> bool:
     """Whether two effects leave far more than noise, and no small part of what there was beyond it."""
     count, hardly_any = sum(b.residual.size for b in current.blocks), TUNING.little_noise[problem.effort.is_ensemble]
-    return current.left > TUNING.hopeless**2 * count and current.left - count > hardly_any * (base.left - count)
+    return current.chi2 > TUNING.hopeless**2 * count and current.chi2 - count > hardly_any * (base.chi2 - count)
 
 
 def is_third_unlikely(problem: Problem, last: Step, current: Fitted) -> bool:
     """Whether a third effect, of drops, would have to take far more than the second did for nothing to be left."""
-    beyond = current.left - sum(b.residual.size for b in current.blocks)
-    return not problem.effort.is_ensemble and beyond > TUNING.no_third_above * max(last.base.left - current.left, 0.0)
+    beyond = current.chi2 - sum(b.residual.size for b in current.blocks)
+    return not problem.effort.is_ensemble and beyond > TUNING.no_third_above * max(last.base.chi2 - current.chi2, 0.0)
 
 
 def is_beyond_chance(found: Step | None, problem: Problem, phases: Phases) -> TypeGuard[Step]:

@@ -33,9 +33,9 @@ TRUNCATIONS = (1.0 - SETTINGS.data.phases.around_peak, *TUNING.later_truncations
 def loading_first(inquiry: Inquiry, found: Taken) -> Taken:
     """What was found, or a better one begun with what explains the way down alone; only where much is left."""
     problem, base = inquiry.problem, found.base
-    if problem.effort.is_ensemble or found.fitted.left < SETTINGS.selection.stepwise.hopeless**2 * found.count:
+    if problem.effort.is_ensemble or found.fitted.chi2 < SETTINGS.selection.stepwise.hopeless**2 * found.count:
         return found
-    if rebound_residual(inquiry, base) < TUNING.least_share * (found.fitted.left - found.count):
+    if rebound_residual(inquiry, base) < TUNING.least_share * (found.fitted.chi2 - found.count):
         return found  # it came to rest as the simulation does, wherever that was
     steps: Sequence[Step] = ()
     for end in TRUNCATIONS:
@@ -43,7 +43,7 @@ def loading_first(inquiry: Inquiry, found: Taken) -> Taken:
         if (
             above is None
             or not above.steps
-            or above.fitted.left > SETTINGS.selection.forward_step.nearly_noise**2 * above.count
+            or above.fitted.chi2 > SETTINGS.selection.forward_step.nearly_noise**2 * above.count
         ):
             break
         steps = above.steps
@@ -51,7 +51,7 @@ def loading_first(inquiry: Inquiry, found: Taken) -> Taken:
     if not begun:
         return found
     other = forward_selection(inquiry, base, begun)
-    if is_better(other.fitted, other.left, found.fitted):
+    if is_better(other.fitted, other.after, found.fitted):
         return other
     problem.with_noise_model(held)
     return found
@@ -109,7 +109,7 @@ def _extended_to_end(inquiry: Inquiry, base: Fitted, steps: Sequence[Step]) -> l
     made: list[Step] = []
     beside = base
     for s in steps:
-        near = [s.fitted, *sorted((f for f in s.rivals if f is not s.fitted), key=lambda f: f.left)[: TUNING.rivals]]
+        near = [s.fitted, *sorted((f for f in s.rivals if f is not s.fitted), key=lambda f: f.chi2)[: TUNING.rivals]]
         tasks = [Task(candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks)) for f in near]
         best, *rivals = inquiry.fits(tasks)
         if best is None:
