@@ -133,7 +133,7 @@ class Fitted:
 
     @property
     def chi2(self) -> float:
-        """Sum over the recordings of (D1) at its minimum, squares over the noise; one for each sample by noise alone."""
+        """Sum over the recordings of (D1) at its minimum, squares over the noise: by noise alone about one a sample."""
         return sum(b.normal()[2] for b in self.blocks)
 
     @property
