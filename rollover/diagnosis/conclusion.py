@@ -8,7 +8,7 @@ from functools import partial
 
 from rollover.diagnosis.alone import alike_beside, fit_single_effect, verdict_on_single_effect
 from rollover.diagnosis.data.dataset import Dataset, left_out, with_uncertain_conditions_at
-from rollover.diagnosis.data.inconsistent import Aside, inconsistency_evidence
+from rollover.diagnosis.data.inconsistent import Aside, inconsistency_sentences
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.data.repeatability import inconsistent_repeats
 from rollover.diagnosis.fit.cross_validation import Groups
@@ -117,7 +117,7 @@ def concluded(
     found = weighted_datasets(scenario, [e for e in every if e.name not in hold_out])
     validation = [e for e in weighted_datasets(scenario, every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < TUNING.least_samples:
-        return cannot_tell(every, names, notes, began, inconsistency_evidence(inconsistencies))
+        return cannot_tell(every, names, notes, began, inconsistency_sentences(inconsistencies))
     notes += [*truncation_notes(every, found), *zero_notes(found)]
     groups = left_out(found)
     notes += inconsistent_repeats(found)

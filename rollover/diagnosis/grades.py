@@ -98,8 +98,8 @@ def with_shares(
         named = [e for e in effects if (e.id, e.channel) == (c.id, c.channel)]
         moves = moved(problem, found.fitted, others, x) if c.kind != "sensor" and named else None
         with_grades += [replace(e, explains=each.get(c.key), moves=moves) for e in named]
-    place = {(e.id, e.channel): n for n, e in enumerate(effects)}
-    return tuple(sorted(with_grades, key=lambda e: place[e.id, e.channel])), whole
+    rank = {(e.id, e.channel): n for n, e in enumerate(effects)}
+    return tuple(sorted(with_grades, key=lambda e: rank[e.id, e.channel])), whole
 
 
 def moved(problem: Problem, fitted: Fitted, others: Sequence[Candidate], x: Sequence[float]) -> float | None:

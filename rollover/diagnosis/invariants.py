@@ -99,9 +99,13 @@ def null_side(problem: Problem, fitted: Fitted) -> tuple[str, float, bool] | Non
     )
     shifts, others = [b.shift for b in fitted.blocks], [v for j, v in enumerate(fitted.x) if j != k]
 
-    def is_met(place: float) -> bool:
+    def is_met(coordinate: float) -> bool:
         there = problem.fit(
-            held_at(fitted, k, place), others, rounds=SETTINGS.inference.intervals.held_rounds, shifts=shifts, width=1
+            held_at(fitted, k, coordinate),
+            others,
+            rounds=SETTINGS.inference.intervals.held_rounds,
+            shifts=shifts,
+            width=1,
         )
         return there is None or there.chi2 - fitted.chi2 < due
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 from rollover.diagnosis.conclusion import Conclusion
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.data.inconsistent import inconsistency_evidence
+from rollover.diagnosis.data.inconsistent import inconsistency_sentences
 from rollover.diagnosis.data.repeatability import contradiction_clause, inconsistent_repeats
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.time_shift import clock_evidence, clock_outliers
+from rollover.diagnosis.fit.time_shift import clock_offset_sentence, clock_outliers
 from rollover.diagnosis.forward.full_run import full_runs
 from rollover.diagnosis.grades import answer_of, share_of
 from rollover.diagnosis.inference.drop_dependence import Dependence, dependence, dependence_of_one
@@ -119,10 +119,10 @@ def reported(c: Conclusion) -> Diagnosis:
             if verdict == "unexplained" and recording_fault is None
             else ""
         )
-        + (clock_evidence(clock_outliers(problem, explanation.fitted, executor.parallel_map)) if is_left else "")
+        + (clock_offset_sentence(clock_outliers(problem, explanation.fitted, executor.parallel_map)) if is_left else "")
         + (by_share(effects, shares, estimated=c.is_beside) if recording_fault is None else "")
         + offered(law)
-        + inconsistency_evidence(c.inconsistencies)
+        + inconsistency_sentences(c.inconsistencies)
         + contradiction_clause(verdict, contrary)
         + tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found)
         + no_contact_clause(found),

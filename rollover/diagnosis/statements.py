@@ -118,8 +118,8 @@ def interval_contains_null(effects: Sequence[Named], scattering: bool) -> set[st
 def no_contact_clause(found: Sequence[Dataset]) -> str:
     """What a sentence goes on with where no recording reaches the first contact that is simulated."""
     contacts = [e.simulator.contact for e in found]
-    ends = [max(float(e.recording.time[s.rows[-1]]) for s in e.signals) for e in found]
-    if any(end >= at or not np.isfinite(at) for end, at in zip(ends, contacts, strict=True)):
+    last_times = [max(float(e.recording.time[s.rows[-1]]) for s in e.signals) for e in found]
+    if any(end >= at or not np.isfinite(at) for end, at in zip(last_times, contacts, strict=True)):
         return ""
     return " None of them reaches the first contact: nothing can be said of the ground."
 
@@ -146,8 +146,8 @@ def by_share(effects: Sequence[Named], scales: Mapping[str, float], *, estimated
     for e in found:
         assert e.explains is not None
         share, low, high = (max(v, 0.0) for v in (e.explains.share, e.explains.low, e.explains.high))
-        form = "; in another form, or beside more" if e.answer == "likeness" and scales else ""
-        said += f" {e.id} explains {share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch{form}."
+        nuance = "; in another form, or beside more" if e.answer == "likeness" and scales else ""
+        said += f" {e.id} explains {share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch{nuance}."
     if found and scales:
         how = "estimated" if estimated else "allowed for"
         said += f" A background was {how} beside it (1 sigma, of the range: {background(scales)})."

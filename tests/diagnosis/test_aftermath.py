@@ -37,7 +37,8 @@ def dataset(counts: float, *, cfc: int | None = None, off: float = 0.0) -> Datas
     there = RunSimulator(scenario, empty).predict({}, 0.0)
     assert there is not None
     made = replace(
-        empty, channels={CHANNEL: there[CHANNEL] + off * (time > IMPACT + SETTINGS.noise.truncation.kept_after_impact)}
+        empty,
+        channels={CHANNEL: there[CHANNEL] + off * (time > IMPACT + SETTINGS.noise.truncation.retained_after_impact)},
     )
     rows = np.arange(0, time.size, 2)
     weight = np.where(time[rows] < IMPACT, 1.0, counts)
@@ -61,12 +62,12 @@ def dataset(counts: float, *, cfc: int | None = None, off: float = 0.0) -> Datas
 def test_an_end_that_hardly_counts_isleft_aside() -> None:
     whole = dataset(0.3)
     found = shortened(whole)
-    assert found.recording.time[-1] == pytest.approx(IMPACT + SETTINGS.noise.truncation.kept_after_impact, abs=STEP)
+    assert found.recording.time[-1] == pytest.approx(IMPACT + SETTINGS.noise.truncation.retained_after_impact, abs=STEP)
     (signal,) = found.signals
     assert signal.weight is not None
     n = signal.rows.size
     assert n == np.count_nonzero(
-        whole.recording.time[whole.signals[0].rows] <= IMPACT + SETTINGS.noise.truncation.kept_after_impact
+        whole.recording.time[whole.signals[0].rows] <= IMPACT + SETTINGS.noise.truncation.retained_after_impact
     )
     np.testing.assert_array_equal(signal.values, whole.signals[0].values[:n])
     assert signal.weight.size == n
@@ -74,7 +75,9 @@ def test_an_end_that_hardly_counts_isleft_aside() -> None:
     assert found.measured().size == n
     np.testing.assert_array_equal(found.perturbed[0], np.arange(n))
     assert isinstance(found.simulator, RunSimulator)
-    assert found.simulator.scenario.simulation.duration < IMPACT + SETTINGS.noise.truncation.kept_after_impact + 0.05
+    assert (
+        found.simulator.scenario.simulation.duration < IMPACT + SETTINGS.noise.truncation.retained_after_impact + 0.05
+    )
     assert truncation_notes([whole], [found]) == ["toss: what comes after 1.10 s is chaotic and was excluded"]
 
 
@@ -82,7 +85,7 @@ def test_an_end_that_counts_is_kept() -> None:
     for e in (
         dataset(0.9),
         replace(dataset(0.3), first_impact=np.inf),
-        replace(dataset(0.3), first_impact=END - SETTINGS.noise.truncation.kept_after_impact),
+        replace(dataset(0.3), first_impact=END - SETTINGS.noise.truncation.retained_after_impact),
     ):
         assert shortened(e) is e
     plain = dataset(0.3)
@@ -113,7 +116,7 @@ def test_a_truncated_run_is_the_same_and_its_filter_looks_ahead() -> None:
     assert isinstance(found.simulator, RunSimulator)
     assert (
         found.simulator.scenario.simulation.duration
-        >= IMPACT + SETTINGS.noise.truncation.kept_after_impact + SETTINGS.forward.run.filter_ahead
+        >= IMPACT + SETTINGS.noise.truncation.retained_after_impact + SETTINGS.forward.run.filter_ahead
     )
     long, short = whole.simulator.predict({}, 0.0), found.simulator.predict({}, 0.0)
     assert long is not None

@@ -11,7 +11,12 @@ from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.local_search import ended
 from rollover.diagnosis.fit.parameterisation import coordinate, followed
-from rollover.diagnosis.fit.time_shift import clock_evidence, clock_outliers, estimate_time_shifts, shifts_from_contact
+from rollover.diagnosis.fit.time_shift import (
+    clock_offset_sentence,
+    clock_outliers,
+    estimate_time_shifts,
+    shifts_from_contact,
+)
 from rollover.diagnosis.forward.forward_model import DropSimulator, simulator_of
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.score_test import score_test
@@ -196,7 +201,7 @@ def test_a_large_offset_is_estimated_by_alignment_of_the_run(late: float) -> Non
     [(name, found)] = clock_outliers(problem, base)
     assert name == problem.dataset[1].name
     assert found == pytest.approx(late, abs=2e-3)  # what `recorded` makes it late by itself is up to 1.5 ms
-    said = clock_evidence([(name, found)])
+    said = clock_offset_sentence([(name, found)])
     assert f"{spoken(abs(found) * 1e3)} ms {'late' if late > 0 else 'early'} ({name})" in said
 
 
@@ -206,7 +211,7 @@ def test_no_clock_is_blamed_for_what_the_simulation_misses(missing: dict[str, ob
     base = problem.fit((), (), rounds=3)
     assert base is not None
     assert clock_outliers(problem, base) == []
-    assert clock_evidence([]) == ""
+    assert clock_offset_sentence([]) == ""
 
 
 def cut_at(problem: Problem, until: float) -> Problem:
@@ -257,7 +262,7 @@ def test_what_is_at_rest_tells_no_time() -> None:
 
 
 def test_milliseconds_that_are_many_are_spoken_in_full() -> None:
-    assert " 6,990 ms late (d)" in clock_evidence([("d", 6.99)])
+    assert " 6,990 ms late (d)" in clock_offset_sentence([("d", 6.99)])
 
 
 def test_a_channel_far_too_early_is_screened_in_full_runs_too() -> None:

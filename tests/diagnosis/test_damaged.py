@@ -110,7 +110,7 @@ def test_recordings_that_contradict_each_other_are_not_explained() -> None:
 
 
 @pytest.mark.parametrize(
-    ("detectable", "is_weak"),
+    ("detectable", "is_underpowered"),
     [
         (
             {"payload-shift": 400.0, "tank-slosh": 400.0, "mount-play": 1e-5},

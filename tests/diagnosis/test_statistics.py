@@ -20,7 +20,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.forward.averaging import block_averaged
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
-from rollover.diagnosis.selection.score_test import null_of_maximum, p_value
+from rollover.diagnosis.selection.score_test import null_from_gram, p_value
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from rollover.recording import Recording
@@ -108,8 +108,8 @@ def test_null_of_the_best_is_that_of_simulated_noise() -> None:
     d = [rng.standard_normal((50, 4)), rng.standard_normal((40, 4))]
     for part in d:
         part[:, 3] = part[:, 2] + 0.1 * rng.standard_normal(part.shape[0])  # two that are nearly one
-    null = null_of_maximum(d)
     D = np.vstack(d)
+    null = null_from_gram(D.T @ D)
     z = rng.standard_normal((20_000, 90)) @ (D / np.linalg.norm(D, axis=0))
     best = np.max(z * z, axis=1)
     for q in (0.5, 0.9, 0.99):

@@ -69,8 +69,8 @@ def marginalised(columns: Array) -> Marginalised:
     if columns.shape[1] == 0:
         return Marginalised(directions=columns, shares=np.zeros(0))
     U, S, _ = np.linalg.svd(columns, full_matrices=False)
-    kept = TUNING.least_singular_value * max(float(S.max(initial=0.0)), 1e-300) < S
-    return Marginalised(directions=U[:, kept], shares=1.0 - 1.0 / np.sqrt(1.0 + S[kept] ** 2))
+    retained = TUNING.least_singular_value * max(float(S.max(initial=0.0)), 1e-300) < S
+    return Marginalised(directions=U[:, retained], shares=1.0 - 1.0 / np.sqrt(1.0 + S[retained] ** 2))
 
 
 def nuisance_parameters(

@@ -107,7 +107,7 @@ def without_inconsistent(every: Sequence[Dataset], inconsistencies: Sequence[Inc
     return [e for e in left if e.signals] if aside else list(every)
 
 
-def inconsistency_evidence(found: Sequence[Aside]) -> str:
+def inconsistency_sentences(found: Sequence[Aside]) -> str:
     """What stands behind a verdict where channels were left aside; nothing where none was."""
     return "".join(f" {inconsistency.says()}" for inconsistency in found)
 

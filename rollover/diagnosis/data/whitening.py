@@ -30,7 +30,7 @@ class Whitening:
     """Whitens stacks of some signals, one after another."""
 
     def __init__(self, signals: Sequence[Noise]) -> None:
-        self.ends = np.cumsum([s.count for s in signals], dtype=np.int64)
+        self.stops = np.cumsum([s.count for s in signals], dtype=np.int64)
         self._sigma = np.array([s.sigma for s in signals], dtype=np.float64)
         self._ar = np.zeros((len(signals), max((len(s.ar) for s in signals), default=0)))
         self._orders = np.array([len(s.ar) for s in signals], dtype=np.int64)
@@ -46,18 +46,18 @@ class Whitening:
             return np.stack([self(column) for column in np.ascontiguousarray(raw.T)], axis=1)
         out = np.empty(raw.size)
         into(
-            np.ascontiguousarray(raw, dtype=np.float64), self.ends, self._sigma, self._sd, self._weight,
+            np.ascontiguousarray(raw, dtype=np.float64), self.stops, self._sigma, self._sd, self._weight,
             self._orders, self._ar, self._gains, out,
         )  # fmt: skip
         return out
 
 
 @leaf
-def into(raw: Any, ends: Any, sigma: Any, sd: Any, weight: Any, orders: Any, ar: Any, gains: Any, out: Any) -> None:
+def into(raw: Any, stops: Any, sigma: Any, sd: Any, weight: Any, orders: Any, ar: Any, gains: Any, out: Any) -> None:
     """y_i = w g (x_i - sum_j a_j x_i-j), x = raw/sigma, or raw/loud where that is not 0, g of the autoregression."""
     first = 0
-    for k in range(ends.size):
-        last, order = ends[k], orders[k]
+    for k in range(stops.size):
+        last, order = stops[k], orders[k]
         for i in range(first, last):
             out[i] = raw[i] / sigma[k]
             if sd[i] != 0.0:

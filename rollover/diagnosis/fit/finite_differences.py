@@ -73,10 +73,10 @@ def adaptive_difference(
             break
         fd_step *= 2.0
     whole = _central_difference(sides)
-    (quiet, over), (loud, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
+    (quiet, over), (noisy, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
     # nothing at all on one side is where an effect ends, and no jump
     discontinuities = (
-        physical and widest > 0.0 and 0.0 < TUNING.discontinuity_ratio * float(quiet @ quiet) < float(loud @ loud)
+        physical and widest > 0.0 and 0.0 < TUNING.discontinuity_ratio * float(quiet @ quiet) < float(noisy @ noisy)
     )
     difference, over = (quiet, over) if discontinuities else (whole, sum(abs(over) for _, over in sides))
     return (difference_beyond_chance(e, difference, chance) if owner.is_local and widest > 0.0 else difference) / over

@@ -91,8 +91,8 @@ class Problem(Simulations):
         fine, shifts = self.effort.fine, [b.shift for b in fitted.blocks]
         self.simulate_neighbourhood(range(len(shifts)), fitted.candidates, fitted.x, shifts, fine)
         blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, fine) for r, b in enumerate(fitted.blocks)]
-        kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
-        return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
+        updated = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
+        return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(updated))
 
     def recounted(self, fitted: Fitted) -> Fitted:
         """A fit where it stands by the slopes that it has, where nothing but what samples count has changed."""
@@ -343,17 +343,17 @@ class Problem(Simulations):
             # keeps all that predicted well, and another ends with those of a place beside it
             slow = gain < TUNING.reuse_least_share * due or gain < TUNING.reuse_least_gain * best
             anew = fresh or (slow and not self.effort.is_ensemble)
-            kept = 0 if anew else len(x) if no_jacobian and self.effort.is_ensemble and not slow else fixed
+            keep = 0 if anew else len(x) if no_jacobian and self.effort.is_ensemble and not slow else fixed
             if last and self.effort.is_ensemble and linearised_at is not None and self.is_beside(x, linearised_at):
-                kept = len(x)
+                keep = len(x)
             elif anew and not has_no_jacobian:
                 linearised_at = x
-            borrowed = self.effort.is_ensemble and ((borrowed and not anew) or 0 < kept == len(x))
+            borrowed = self.effort.is_ensemble and ((borrowed and not anew) or 0 < keep == len(x))
             if not has_no_jacobian:
-                self.simulate_neighbourhood(use, candidates, x, shifts, fd_step, kept)
+                self.simulate_neighbourhood(use, candidates, x, shifts, fd_step, keep)
             again = [
                 self.block(
-                    r, candidates, x, s, fd_step, None if not kept or has_no_jacobian else block.unweighted_J[:, :kept]
+                    r, candidates, x, s, fd_step, None if not keep or has_no_jacobian else block.unweighted_J[:, :keep]
                 )
                 for r, s, block in zip(use, shifts, blocks, strict=True)
             ]

@@ -102,7 +102,7 @@ def is_explained_by_clocks(problem: Problem, fitted: Fitted, parallel_map: Paral
     return bool(late) and all(b.normal()[2] < TUNING.accepted_power * b.residual.size for b in others)
 
 
-def clock_evidence(found: Sequence[tuple[str, float]]) -> str:
+def clock_offset_sentence(found: Sequence[tuple[str, float]]) -> str:
     """What of `clock_outliers` stands behind the verdict."""
     each = [f"{spoken(abs(s) * 1e3)} ms {'late' if s > 0.0 else 'early'} ({name})" for name, s in found]
     if not each:
@@ -133,8 +133,8 @@ def _distant_shift(problem: Problem, r: int, *, fitted: Fitted) -> float | None:
         lambda raws, shifts: np.array([_left(e, raw, float(shift)) for raw, shift in zip(raws, shifts, strict=True)]),
         np.arange(-TUNING.largest_error, TUNING.largest_error, min(e.shift_prior, TUNING.no_physics)),
     )
-    shown = [at for at in onset_delay(e) if abs(at) > TUNING.no_physics] if falls else []
-    starts = [*([] if about is None else [about]), *shown]
+    delays = [at for at in onset_delay(e) if abs(at) > TUNING.no_physics] if falls else []
+    starts = [*([] if about is None else [about]), *delays]
     if not starts:
         return None
     there, least = min((_local_minimum(left, start, e.shift_prior) for start in starts), key=lambda found: found[1])
@@ -199,14 +199,14 @@ def _best(problem: Problem, r: int, made: Made, cost: Cost, shifts: Array) -> fl
     raw = made(0.0)
     if raw is None:
         return None
-    rough = []
+    costs = []
     for first in range(0, len(shifts), TUNING.search_at_once):
         some = shifts[first : first + TUNING.search_at_once]
         moved = np.empty((len(some), raw.size))
         for time, (_, part) in zip(e.times, e.spans(), strict=True):
             moved[:, part] = np.interp(time - some[:, None], time, raw[part])
-        rough.append(cost(moved, some))
-    near = shifts[int(np.argmin(np.concatenate(rough)))] + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
+        costs.append(cost(moved, some))
+    near = shifts[int(np.argmin(np.concatenate(costs)))] + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
     there = [made(float(s)) for s in near]
     left = np.full(len(near), np.inf)
     known = [k for k, y in enumerate(there) if y is not None]

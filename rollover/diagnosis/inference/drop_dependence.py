@@ -55,8 +55,8 @@ class Dependence:
 
         In tests that begin alike all goes in time, what the vehicle does too; a sensor's fault goes with no attitude.
         """
-        tells = bool(motion.shares) and motion.shares[0][0] != TIME and motion.shares[0][1] > TUNING.sensor_share
-        return self.on == TIME and tells
+        has_quantity = bool(motion.shares) and motion.shares[0][0] != TIME and motion.shares[0][1] > TUNING.sensor_share
+        return self.on == TIME and has_quantity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -207,10 +207,10 @@ def _of_forces(
         if where == "ground":
             by_touch = [np.array([[1.0, np.log(d.way.touch)]]) for d in found]
             functions.append((IMPACT, [s * row for s, row in zip(strength, by_touch, strict=True)]))
-        ends = np.cumsum([basis[0].shape[1] for _, basis in functions])[:-1]
+        splits = np.cumsum([basis[0].shape[1] for _, basis in functions])[:-1]
         forces = [np.hstack([basis[k] for _, basis in functions]) for k in range(len(found))]
         felt = parallel_map(problem, partial(_felt, where=where), list(zip(found, forces, strict=True)))
-        each = zip(*(np.split(J, ends, axis=1) for J in felt), strict=True)
+        each = zip(*(np.split(J, splits, axis=1) for J in felt), strict=True)
         models += [Model(on=on, columns=columns) for (on, _), columns in zip(functions, each, strict=True)]
     n = float(sum(w.size for w in misfits))
     free = sum(d.free for d in found)

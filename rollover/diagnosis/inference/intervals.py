@@ -124,7 +124,7 @@ def profile_extents(
     that scatter it is the misfit of their mean, which is rough by itself. With `sides` these alone are looked at.
     """
     found, due = np.ones((own.size, 2)), TWO_SIDED**2 * dispersion
-    enough = max(TUNING.least_rise * due, TUNING.rough_rise if any(e.perturbed for e in problem.dataset) else 0.0)
+    enough = max(TUNING.least_rise * due, TUNING.model_error_rise if any(e.perturbed for e in problem.dataset) else 0.0)
     if sides is not None and not any(sides.values()):
         return found
     start = _misfit(problem, fitted, np.zeros(len(fitted.x)))
@@ -354,12 +354,12 @@ def intervals(
         variance = np.maximum(variance, between_recording_variance(problem.dataset, fitted.blocks, inverse))
     sd = np.sqrt(variance)[primary]
     own = np.sqrt(dispersion * np.diag(inverse))[primary]
-    rough = np.full((own.size, 2), np.nan)
+    extents = np.full((own.size, 2), np.nan)
     if strayed and sides is None:
-        rough = quadratic_extents(problem, problem.again(coarse), own, dispersion)
-        sides = {k: BOTH for k in range(own.size) if np.isnan(rough[k, 0])}  # for means of seven runs
+        extents = quadratic_extents(problem, problem.again(coarse), own, dispersion)
+        sides = {k: BOTH for k in range(own.size) if np.isnan(extents[k, 0])}  # for means of seven runs
     far = profile_extents(problem, coarse, own, dispersion, sides)
-    wide = np.fmax(np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (far**2 - 1.0)), own[:, None] * rough)
+    wide = np.fmax(np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (far**2 - 1.0)), own[:, None] * extents)
     if not problem.effort.is_ensemble:
         wide = _within_range(problem, estimated, wide, dispersion)
     found, at = [], 0
@@ -381,9 +381,8 @@ def intervals(
             )
             at += 1
         if c.id == "sensor-clipping":
-            values = {
-                name: with_full_scale(one, full_scale_of(problem.dataset, c.channel)) for name, one in values.items()
-            }
+            end = full_scale_of(problem.dataset, c.channel)
+            values = {name: with_full_scale(one, end) for name, one in values.items()}
         values |= {n: Interval(value=v, low=v, high=v, unit=units.get(n, "")) for n, v in c.variant.items()}
         found.append(values)
     return found
@@ -391,8 +390,7 @@ def intervals(
 
 def full_scale_of(dataset: Sequence[Dataset], channel: str | None) -> float | None:
     """Size of the largest value of a channel if it is met again and again, to the last digit: the end of a range."""
-    ends = [s.end for e in dataset for s in e.signals if s.channel == channel]
-    return max(ends, default=0.0) or None
+    return max((s.end for e in dataset for s in e.signals if s.channel == channel), default=0.0) or None
 
 
 def with_full_scale(fitted: Interval, end: float | None) -> Interval:

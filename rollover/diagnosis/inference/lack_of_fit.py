@@ -57,8 +57,8 @@ class Cell:
     excess: float
     structured: float
     waves: int
-    rough: float
-    noise: tuple[float, float]  # what noise alone leaves of `structured`, and of `rough`
+    noise_power: float
+    noise: tuple[float, float]  # what noise alone leaves of `structured`, and of `noise_power`
     strayed: Array = field(default_factory=lambda: np.zeros((0, 2)))  # (k, 2): and each neighbour
 
     @property
@@ -169,14 +169,14 @@ def _p_value(cells: Sequence[Cell], clocks: int) -> float:
 
     structured = sum(c.structured for c in cells)
     waves = sum(c.waves for c in cells)
-    rough = sum(c.rough for c in cells)
+    noise_power = sum(c.noise_power for c in cells)
     count = sum(c.rows.size for c in cells) - waves - clocks
     if not waves or count <= 0:
         return 1.0
     if all(c.noise[0] == c.waves for c in cells):
         # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
         return float(
-            fdtrc(waves, count, (structured / waves) / min(max(rough / count, 1e-300), TUNING.most_dispersion))
+            fdtrc(waves, count, (structured / waves) / min(max(noise_power / count, 1e-300), TUNING.most_dispersion))
         )
     expected = sum(c.expected for c in cells)
     variance = sum(2.0 * c.noise[0] * (1.0 + 2.0 * (c.expected - c.noise[0]) / c.waves) for c in cells)
@@ -188,7 +188,7 @@ def _p_value(cells: Sequence[Cell], clocks: int) -> float:
             scatter = SETTINGS.noise.ensemble.few_factor * float(np.var(apart, ddof=1))
             variance += scatter
             unsure += scatter / apart.size  # a mean is known as well as so many tell
-    level = min(max(rough / max(sum(c.rest for c in cells), 1e-300), 1.0), TUNING.most_dispersion)
+    level = min(max(noise_power / max(sum(c.rest for c in cells), 1e-300), 1.0), TUNING.most_dispersion)
     known = 2.0 * expected**2 / unsure
     return float(fdtrc(2.0 * expected**2 / variance, known, structured / expected / level))
 
@@ -219,11 +219,11 @@ def _cell(
     basis = basis - taken @ (taken.T @ basis)
     Q, _ = np.linalg.qr(basis)
     inside = Q.T @ w
-    structured, rough = float(inside @ inside), float(w @ w - inside @ inside)
+    structured, noise_power = float(inside @ inside), float(w @ w - inside @ inside)
     free = max(n - waves - 1, 1)
     found = Cell(
         recording=r, channel=channel, phase=phase, start=float(time[0]), end=float(time[-1]), rows=rows, p_value=1.0,
-        excess=float(w @ w) - n, structured=structured, waves=waves, rough=max(rough, 0.0),
+        excess=float(w @ w) - n, structured=structured, waves=waves, noise_power=max(noise_power, 0.0),
         noise=(float(waves), float(n - waves)),
     )  # fmt: skip
     if due is not None:
@@ -233,7 +233,7 @@ def _cell(
         return replace(found, excess=excess, p_value=_p_value([found], 1))
     if n <= waves + 1:
         return found
-    return replace(found, p_value=float(fdtrc(waves, free, (structured / waves) / max(rough / free, 1e-300))))
+    return replace(found, p_value=float(fdtrc(waves, free, (structured / waves) / max(noise_power / free, 1e-300))))
 
 
 def _holm(p: Sequence[float]) -> tuple[float, ...]:
@@ -269,6 +269,6 @@ def is_tolerated(problem: Problem, fitted: Fitted) -> bool:
 
     One error of unit size for each of k signals: a mean square of 1 with a standard deviation of sqrt(2/k).
     """
-    rough = [e.model_error_dominates(s) for e in problem.dataset for s in e.signals]
-    most = 1.0 + 2.0 * np.sqrt(2.0 / len(rough))
-    return all(rough) and bool(fitted.chi2 < most * sum(b.residual.size for b in fitted.blocks))
+    dominated = [e.model_error_dominates(s) for e in problem.dataset for s in e.signals]
+    most = 1.0 + 2.0 * np.sqrt(2.0 / len(dominated))
+    return all(dominated) and bool(fitted.chi2 < most * sum(b.residual.size for b in fitted.blocks))

@@ -30,9 +30,9 @@ def drawn(problem: Problem, fitted: Fitted, count: int, seed: int = 0) -> Draws:
     A = sum((b.normal()[0] for b in blocks), np.zeros((p, p))) + GENTLE * np.eye(p)
 
     def log_density(x: Array) -> float:
-        place, left = [float(v) for v in x], 0.0
+        prefix, left = [float(v) for v in x], 0.0
         for r, there in enumerate(blocks):
-            found = problem.block(r, fitted.candidates, place, there.shift, 0.0, clock=False)
+            found = problem.block(r, fitted.candidates, prefix, there.shift, 0.0, clock=False)
             if found is None:
                 return -np.inf
             g = float(there.slope @ found.residual) - found.shift * there.prior**-2
@@ -46,8 +46,8 @@ def drawn(problem: Problem, fitted: Fitted, count: int, seed: int = 0) -> Draws:
     marked: list[float] = []
     each = list(with_slices(fitted.candidates))
     for c, own in each:
-        place = ".".join([c.id, *([c.channel] if c.channel else [])])
-        names += [f"{place}.{name}" for name in c.search]
+        prefix = ".".join([c.id, *([c.channel] if c.channel else [])])
+        names += [f"{prefix}.{name}" for name in c.search]
         units += [units_of(EFFECTS[c.id], c.channel).get(name, "") for name in c.search]
         marked += c.values(fitted.x[own]).values()
     values = np.array([[v for c, own in each for v in c.values(x[own]).values()] for x in made.draws])

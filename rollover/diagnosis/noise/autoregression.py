@@ -48,10 +48,10 @@ def with_noise_of_quiet_stretches(dataset: Sequence[Dataset], residuals: Sequenc
             continue  # too short: what each says by itself stands
         for (r, k, s, _), misfit, value, size in zip(members, misfits, values, sizes, strict=True):
             own = _quieter([misfit], [value])
-            loud = (
+            noisy = (
                 own is not None and own.windows >= TUNING.least_windows and own.sigma > TUNING.own_level * common.sigma
             )
-            best = own if own is not None and loud else common
+            best = own if own is not None and noisy else common
             found[r][k] = replace(s, noise=best.sigma * size, ar=best.ar)
     found = [
         [replace(with_noise(s, s.noise, s.ar, e.model_error_of(s)), at_rest=(s.noise, s.ar)) for s in f]
@@ -270,38 +270,38 @@ def _correlation(step: float, every: float, cfc: int) -> Array:
     return np.asarray(covariance / covariance[0])
 
 
-def autoregression(series: Sequence[Array], most: int = TUNING.longest_memory) -> tuple[float, tuple[float, ...]]:
+def autoregression(residuals: Sequence[Array], most: int = TUNING.longest_memory) -> tuple[float, tuple[float, ...]]:
     """Standard deviation and coefficients of one autoregression behind several series; its order by BIC."""
-    most = min(most, max(0, min(v.size for v in series) // 8))
-    return _driven(series, [(k, k) for k in range(1, most + 1)])
+    most = min(most, max(0, min(v.size for v in residuals) // 8))
+    return _driven(residuals, [(k, k) for k in range(1, most + 1)])
 
 
-def long_memory(series: Sequence[Array]) -> tuple[float, tuple[float, ...]]:
+def long_memory(residuals: Sequence[Array]) -> tuple[float, tuple[float, ...]]:
     """The same of a noise of 1/f: one coefficient for lag 1, for 2, for 3 and 4, for 5 to 8 and on, twice as far each.
 
     Heterogeneous autoregression, Corsi (2009), in octaves.
     """
-    most = min(v.size for v in series) // 8
-    return _driven(series, [(k // 2 + 1, k) for k in TUNING.octaves if k <= most], TUNING.coefficient_cost)
+    most = min(v.size for v in residuals) // 8
+    return _driven(residuals, [(k // 2 + 1, k) for k in TUNING.octaves if k <= most], TUNING.coefficient_cost)
 
 
 def _driven(
-    series: Sequence[Array], lags: Sequence[tuple[int, int]], dear: float | None = None
+    residuals: Sequence[Array], lags: Sequence[tuple[int, int]], dear: float | None = None
 ) -> tuple[float, tuple[float, ...]]:
     """An autoregression on means of the past over `lags` (first, last), on so many of the first as BIC asks for.
 
     Or as a criterion in which each costs as `dear`.
     """
     most = lags[-1][1] if lags else 0
-    sums = [np.concatenate([[0.0], np.cumsum(v)]) for v in series]
+    sums = [np.concatenate([[0.0], np.cumsum(v)]) for v in residuals]
     past = [
-        np.concatenate([v[most - last : v.size - last] for v in series])
+        np.concatenate([v[most - last : v.size - last] for v in residuals])
         if first == last
         else np.concatenate([c[most - first + 1 : c.size - first] - c[most - last : c.size - last - 1] for c in sums])
         / (last - first + 1)
         for first, last in lags
     ]
-    y = np.concatenate([v[most:] for v in series])
+    y = np.concatenate([v[most:] for v in residuals])
     n = y.size
     best: tuple[float, float, tuple[float, ...]] | None = None
     for order in range(len(lags) + 1):

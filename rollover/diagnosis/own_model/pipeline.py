@@ -67,7 +67,7 @@ def _diagnosed(model: ForwardModel, asked: Asked, tolerance: float) -> Diagnosis
     names, executor = list(asked.recordings), asked.executor
     every, notes = prepared_for(model, asked.recordings)
     every = with_noise(model, [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every])
-    found, kept = ([e for e in every if (e.name in asked.hold_out) == held] for held in (False, True))
+    found, validation = ([e for e in every if (e.name in asked.hold_out) == held] for held in (False, True))
     if sum(e.count for e in found) < TUNING.least_samples:
         return cannot_tell(every, names, notes, asked.began)
     problem = Problem(found)
@@ -76,7 +76,7 @@ def _diagnosed(model: ForwardModel, asked: Asked, tolerance: float) -> Diagnosis
     if base is None:
         return cannot_tell(every, names, [*notes, "the model could not be fitted"], asked.began)
     groups = left_out(found)
-    if len(groups) < 2 and not kept:
+    if len(groups) < 2 and not validation:
         notes.append("one recording only: what stands as held out is predicted by the fit to it")
     inquiry = Inquiry(
         problem=problem,
@@ -86,7 +86,7 @@ def _diagnosed(model: ForwardModel, asked: Asked, tolerance: float) -> Diagnosis
         say=asked.say,
         executor=executor,
     )
-    concluded = conclusion_of(asked, inquiry, base, kept, acts="model", notes=notes)
+    concluded = conclusion_of(asked, inquiry, base, validation, acts="model", notes=notes)
     fitted = concluded.explanation.fitted
     if not model.parameters:
         return reported(concluded)

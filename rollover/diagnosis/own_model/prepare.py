@@ -161,8 +161,8 @@ def _tried(simulator: ModelSimulator) -> None:
         if moved is not None and all(np.array_equal(first[c], moved[c]) for c in first):
             continue  # it may have no part in this recording
         beside = {f"{term.id}.{n}": p.low for n, p in term.parameters.items() if p.null is None}
-        nothing = simulator.run({**beside, **nulls})
-        if nothing is None or any(not np.array_equal(first[c], nothing[c]) for c in first):
+        at_null = simulator.run({**beside, **nulls})
+        if at_null is None or any(not np.array_equal(first[c], at_null[c]) for c in first):
             raise simulator.refused(
                 f"{term.id} does something at its null; with its strength there no output may change"
             )

@@ -109,8 +109,8 @@ class ModelSimulator:
                 yield f"simulate returned no numbers as {name}, got {made[name]!r}; floats are needed"
                 continue
             if values.shape != self.recording.time.shape:
-                needed = self.recording.time.shape
-                yield f"simulate returned {name} of shape {values.shape}; {needed} is needed, one a stamp"
+                shape = self.recording.time.shape
+                yield f"simulate returned {name} of shape {values.shape}; {shape} is needed, one a stamp"
 
     def perturbed(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1

@@ -129,8 +129,8 @@ def showing(e: Dataset, raw: Array) -> Dataset:
 
 def only(e: Dataset, channels: Sequence[str]) -> Dataset:
     """The recording of some of its channels alone."""
-    kept = [s.channel in channels for s in e.signals]
-    rows = np.concatenate([np.full(s.rows.size, k) for s, k in zip(e.signals, kept, strict=True)])
+    retained = [s.channel in channels for s in e.signals]
+    rows = np.concatenate([np.full(s.rows.size, k) for s, k in zip(e.signals, retained, strict=True)])
     nuisance = None if e.nuisance is None else e.nuisance[rows]
-    signals = tuple(s for s, k in zip(e.signals, kept, strict=True) if k)
+    signals = tuple(s for s, k in zip(e.signals, retained, strict=True) if k)
     return replace(e, signals=signals, nuisance=nuisance)

@@ -121,14 +121,14 @@ def required_noncentrality(power: float, size: float, freedoms: int = 1) -> floa
     return float(brentq(lambda v: detection(v, size, freedoms) - power, 0.0, 1e4))
 
 
-def choice(noncentrality: float, beside_nothing: float = math.inf) -> float:
-    """(P2): probability that the misfit chooses the right one of two; `beside_nothing` is L, of the effect alone."""
-    if math.isinf(beside_nothing):
+def choice(noncentrality: float, unopposed: float = math.inf) -> float:
+    """(P2): probability that the misfit chooses the right one of two; `unopposed` is L, of the effect alone."""
+    if math.isinf(unopposed):
         return _normal(0.5 * math.sqrt(noncentrality))
-    cosine = math.sqrt(max(1.0 - noncentrality / beside_nothing, 0.0)) if beside_nothing > 0.0 else 1.0
+    cosine = math.sqrt(max(1.0 - noncentrality / unopposed, 0.0)) if unopposed > 0.0 else 1.0
     # 1 - c without the rounding of a difference
-    g = math.sqrt(0.5 * min(noncentrality, beside_nothing) / (1.0 + cosine))
-    h = math.sqrt(0.5 * beside_nothing * (1.0 + cosine))
+    g = math.sqrt(0.5 * min(noncentrality, unopposed) / (1.0 + cosine))
+    h = math.sqrt(0.5 * unopposed * (1.0 + cosine))
     return _normal(g) * _normal(h) + _normal(-g) * _normal(-h)
 
 

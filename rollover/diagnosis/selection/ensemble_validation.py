@@ -71,8 +71,8 @@ def without_unsupported_rivals(found: Step, scored: ScoreTest, spoken: float = T
     spoken_for = [
         c for c in last if c.key in scored.far or p_value(scored.scores.get(c.key, 0.0), scored.null) < spoken
     ]
-    kept = [*spoken_for, *same_family(last, spoken_for)]
-    return replace(found, rivals=tuple(f for f in found.rivals if f.candidates[-1] in kept))
+    retained = [*spoken_for, *same_family(last, spoken_for)]
+    return replace(found, rivals=tuple(f for f in found.rivals if f.candidates[-1] in retained))
 
 
 def ensemble_validated(problem: Problem, found: Step, groups: Groups) -> Step | None:

@@ -261,16 +261,8 @@ def _visible(c: Candidate, x: Sequence[float], size: float) -> float | None:
     return value if is_limit(c) and size >= TUNING.visible else None
 
 
-def null_of_maximum(directions: Sequence[Array], draws: int = TUNING.draws, seed: int = 0) -> Array:
-    """Largest gain on noise (draws,), sorted; `directions` are, for each recording, arrays (n_r, m)."""
-    m = directions[0].shape[1] if len(directions) else 0
-    if m == 0:
-        return np.zeros(draws)
-    return null_from_gram(sum((np.asarray(d).T @ np.asarray(d) for d in directions), np.zeros((m, m))), draws, seed)
-
-
 def null_from_gram(G: Array, draws: int = TUNING.draws, seed: int = 0) -> Array:
-    """The same by the scalar products of the directions (m, m)."""
+    """Largest gain on noise (draws,), sorted, by the scalar products of the directions (m, m)."""
     m = len(G)
     size = np.sqrt(np.maximum(np.diag(G), 1e-300))
     root = np.linalg.cholesky(G / np.outer(size, size) + TUNING.jitter * m * np.eye(m))

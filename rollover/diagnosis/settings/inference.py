@@ -85,7 +85,7 @@ class Intervals:
     end_error: float = 1e-3  # share of such an end: half width of its interval; chosen
     least_rise: float = 0.4  # share of the due rise of the misfit; chosen
     # rise of the misfit that is no chance; misfits of means of runs scatter by 3 (1 sd) from place to place
-    rough_rise: float = 8.0
+    model_error_rise: float = 8.0
     # factors of the half width at which one looks behind a rise; chosen
     scan_factors: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
     widen_above: float = 1.2  # factor: below it an interval that is too narrow is chance; chosen

@@ -37,7 +37,7 @@ class Autoregression:
 class Drift:
     """Drift of a channel."""
 
-    approach_terms: int = 5  # cosines of a stretch, the first of them its mean; chosen
+    drift_terms: int = 5  # cosines of a stretch, the first of them its mean; chosen
     contact_terms: int = 8  # cosines of all that follows the contact; chosen
     least_samples: int = 24  # samples of an approach; chosen
     least_recordings: int = 3  # recordings that show what they share; chosen
@@ -130,7 +130,7 @@ class SpectralLines:
 class Truncation:
     """End of a recording that is left out."""
 
-    kept_after_impact: float = 0.6  # s after the impact that are always kept; chosen
+    retained_after_impact: float = 0.6  # s after the impact that are always kept; chosen
     least_cut: float = 0.1  # s: a shorter end is not cut off; chosen
     least_weight: float = 0.3  # share of full weight on average: from it on the end is kept; chosen
     least_misfit: float = 3.0  # ratio to what noise and scatter leave: an end that is missed by more is kept; chosen
