@@ -24,7 +24,7 @@ from rollover.diagnosis.grades import graded, with_shares
 from rollover.diagnosis.inference.discrepancy import Discrepancy
 from rollover.diagnosis.inference.lack_of_fit import is_enough, is_tolerated, mismatch_of
 from rollover.diagnosis.inference.recording_faults import RecordingFault, intrinsic_faults, misread, truncation_fault
-from rollover.diagnosis.invariants import clear_of_null, is_noise_alone, next_best, rejected_effects
+from rollover.diagnosis.invariants import NAMING, clear_of_null, is_noise_alone, next_best, rejected_effects
 from rollover.diagnosis.noise.offsets import zero_notes
 from rollover.diagnosis.noise.truncation import truncation_notes
 from rollover.diagnosis.power import cannot_tell
@@ -49,7 +49,6 @@ from rollover.dynamics.drop_test import unfit
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 
-NAMING = ("parameter", "sensor", "missing-physics")  # verdicts that name effects
 TUNING = SETTINGS.report.conclusion
 AS_NOISE = "what is left is 1.0 times the noise, or hardly more and before the first contact: no more than noise"
 

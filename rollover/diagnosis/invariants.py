@@ -99,9 +99,9 @@ def null_side(problem: Problem, fitted: Fitted) -> tuple[str, float, bool] | Non
     )
     shifts, others = [b.shift for b in fitted.blocks], [v for j, v in enumerate(fitted.x) if j != k]
 
-    def is_met(coordinate: float) -> bool:
+    def is_met(x: float) -> bool:
         there = problem.fit(
-            held_at(fitted, k, coordinate),
+            held_at(fitted, k, x),
             others,
             rounds=SETTINGS.inference.intervals.held_rounds,
             shifts=shifts,

@@ -64,25 +64,14 @@ def diagnose(
     ``ValueError`` for a name in `hold_out` or `reference` that is none, a tolerance outside 0 to 1.
     """
     began = clock.perf_counter()
-    names = [name for name, _ in recordings]
-    for option, given in (("hold_out", hold_out), ("reference", reference)):
-        for name in given:
-            if name not in names:
-                raise ValueError(f"{option}: no such recording, got {name!r}; {', '.join(names)}")
     stated = dict(tolerance) if isinstance(tolerance, Mapping) else {}
     general = 0.0 if isinstance(tolerance, Mapping) else tolerance
-    for share in (general, *stated.values()):
-        if not 0.0 <= share < 1.0:
-            raise ValueError(f"tolerance: not a share of a range, got {share:g}; at least 0 and below 1")
-    channels = dict.fromkeys(channel for _, r in recordings for channel in r.channels)
-    for channel in stated:
-        if channel not in channels:
-            raise ValueError(f"tolerance: no such channel recorded, got {channel!r}; {', '.join(channels)}")
+    _check_options(recordings, hold_out, reference, general, stated)
     executor = executor or Executor()
     if posterior and unfit(scenario):
         raise ValueError("posterior: of drops only, got an overturn; 0 draws, or those of a calibration")
     recordings, zeros = with_clock_zeros(scenario, [(name, continuous(r)) for name, r in recordings])
-    is_drop = isinstance(scenario.vehicle, Striker)  # what little errors do to an overturn is chance, see `chaos`
+    is_drop = isinstance(scenario.vehicle, Striker)  # what small errors do to an overturn is ensemble scatter
     recordings, rounded = with_rounding_uncertainty(recordings) if is_drop else (recordings, [])
     every, notes = prepared(scenario, recordings, executor)
     notes += [*clock_notes(scenario, recordings, zeros), *rounded]
@@ -104,25 +93,48 @@ def diagnose(
         asked = replace(asked, discrepancy=Discrepancy(scales=stated))
     if asked.discrepancy is not None:
         every = with_discrepancy(every, asked.discrepancy)
-    some, shared = find_inconsistencies(every)
-    wrong = wrong_conditions([e for e in without_inconsistent(every, some) if e.name not in hold_out])
-    every = [e for e in every if e.name not in {one.dataset.name for one in wrong}]
-    usable = without_inconsistent(every, some)
-    first = concluded(asked, usable, [*some, *wrong], notes)
+    inconsistent, shared = find_inconsistencies(every)
+    misstated = wrong_conditions([e for e in without_inconsistent(every, inconsistent) if e.name not in hold_out])
+    every = [e for e in every if e.name not in {one.dataset.name for one in misstated}]
+    usable = without_inconsistent(every, inconsistent)
+    first = concluded(asked, usable, [*inconsistent, *misstated], notes)
     is_open = estimate == "unexplained" and not (reference or stated or general > 0.0)
-    doubtful = first if is_open and isinstance(first, Conclusion) and first.verdict == "unexplained" else None
-    if doubtful is not None and not shared:
-        # what is said of a residual beside noise alone takes long, and is said only where nothing else is
-        found = _second_opinion(doubtful, usable, notes) or _answered(doubtful, usable, notes)
+    unexplained = first if is_open and isinstance(first, Conclusion) and first.verdict == "unexplained" else None
+    if unexplained is not None and not shared:
+        # a report on an unexplained residual takes long, and is made only where there is no second opinion
+        found = _second_opinion(unexplained, usable, notes) or _answered(unexplained, usable, notes)
     else:
         found = _answered(first, usable, notes)
         if found.verdict == "unexplained" and shared:
-            # beside a factor so large what else is missing may be out of sight
-            other = _diagnosed(asked, without_inconsistent(every, [*some, *shared]), [*some, *shared, *wrong], notes)
+            # a factor that all recordings of a channel share may hide what else is missing: once more without these
+            left_out = [*inconsistent, *shared]
+            other = _diagnosed(asked, without_inconsistent(every, left_out), [*left_out, *misstated], notes)
             found = other if other.effects else found
-        if found.verdict == "unexplained" and doubtful is not None:
-            found = _second_opinion(doubtful, usable, notes) or found
+        if found.verdict == "unexplained" and unexplained is not None:
+            found = _second_opinion(unexplained, usable, notes) or found
     return checked(replace(found, clocks=zeros, seconds=clock.perf_counter() - began))
+
+
+def _check_options(
+    recordings: Sequence[tuple[str, Recording]],
+    hold_out: Sequence[str],
+    reference: Sequence[str],
+    general: float,
+    stated: Mapping[str, float],
+) -> None:
+    """Refuse names that are no recordings' or channels', and tolerances outside 0 to 1. Raises ``ValueError``."""
+    names = [name for name, _ in recordings]
+    for option, given in (("hold_out", hold_out), ("reference", reference)):
+        for name in given:
+            if name not in names:
+                raise ValueError(f"{option}: no such recording, got {name!r}; {', '.join(names)}")
+    for share in (general, *stated.values()):
+        if not 0.0 <= share < 1.0:
+            raise ValueError(f"tolerance: not a share of a range, got {share:g}; at least 0 and below 1")
+    channels = dict.fromkeys(channel for _, r in recordings for channel in r.channels)
+    for channel in stated:
+        if channel not in channels:
+            raise ValueError(f"tolerance: no such channel recorded, got {channel!r}; {', '.join(channels)}")
 
 
 def _diagnosed(

@@ -10,6 +10,7 @@ from rollover.diagnosis.conclusion import Conclusion
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import inconsistency_sentences
 from rollover.diagnosis.data.repeatability import contradiction_clause, inconsistent_repeats
+from rollover.diagnosis.fit.cross_validation import HeldOutMisfit
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.time_shift import clock_offset_sentence, clock_outliers
 from rollover.diagnosis.forward.full_run import full_runs
@@ -23,7 +24,7 @@ from rollover.diagnosis.inference.vehicle_dependence import dependency, misfit_b
 from rollover.diagnosis.planning.next_test import next_test
 from rollover.diagnosis.power import is_underpowered
 from rollover.diagnosis.probabilities import NOTHING, probabilities
-from rollover.diagnosis.result import Degree, Diagnosis, Draws, Named, Share
+from rollover.diagnosis.result import Degree, Diagnosis, Draws, Named, Share, Verdict
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     by_share,
@@ -43,42 +44,23 @@ from rollover.effects import spoken
 
 def reported(c: Conclusion) -> Diagnosis:
     """A conclusion as it is reported, with what the mismatch depends on."""
-    asked, problem, explanation, recording_fault, verdict, effects = (
-        c.asked,
-        c.problem,
-        c.explanation,
-        c.recording_fault,
-        c.verdict,
-        c.effects,
-    )
-    executor, groups, found, set_ups = asked.executor, c.groups, list(problem.dataset), c.set_ups
+    asked, problem, explanation, recording_fault = c.asked, c.problem, c.explanation, c.recording_fault
+    verdict, effects, groups, found, set_ups = c.verdict, c.effects, c.groups, list(problem.dataset), c.set_ups
     before, after = explanation.before, explanation.after
     is_mismatch = verdict not in ("no-mismatch", "cannot-tell") and recording_fault is None
     asked.say("what the mismatch depends on")
-    depends_on = Dependence()
-    degrees: tuple[Degree, ...] = ()
-    if c.acts == "drop" and is_mismatch:
-        depends_on = dependence(problem, set_ups, explanation.base, executor.parallel_map)
-    elif c.acts == "rollover":
-        degrees = misfit_by_degree_of_freedom(set_ups, found, [b.shift for b in explanation.base.blocks])
-        of_one = dependence_of_one(problem, explanation.base, before) if is_mismatch else None
-        of_motion = Dependence(shares=dependency(problem, explanation.base))
-        depends_on = of_motion if of_one is None or of_one.yields_to(of_motion) else of_one
+    depends_on, degrees = _dependence(c, is_mismatch=is_mismatch)
     law = None
     if verdict == "unexplained" and c.acts == "drop" and recording_fault is None:
         asked.say("a law for the unexplained residual")
         law = proposed(problem, explanation.base, set_ups, found, groups)
-    told_of = {} if asked.discrepancy is None else asked.discrepancy.scales_by_channel(found)
-    shares = {} if asked.discrepancy is None else {k: asked.discrepancy.scales[k] for k in told_of}
+    model_error = {} if asked.discrepancy is None else asked.discrepancy.scales_by_channel(found)
+    shares = {} if asked.discrepancy is None else {k: asked.discrepancy.scales[k] for k in model_error}
     detectable = dict(explanation.detectable)
     contrary = inconsistent_repeats(found, SETTINGS.data.repeatability.contradiction)
     if verdict == "no-mismatch" and not c.slight and (contrary or is_underpowered(detectable)):
         verdict = "cannot-tell"
     h_before, h_after = (judged(problem, f, c.validation, groups) for f in (explanation.base, explanation.fitted))
-    early = (
-        misfit_before_impact(problem.dataset, explanation.base),
-        misfit_before_impact(problem.dataset, explanation.fitted),
-    )
     remains = not (c.is_beside and is_tolerated(problem, explanation.fitted)) and not is_enough(
         problem, explanation.fitted, after
     )
@@ -92,40 +74,19 @@ def reported(c: Conclusion) -> Diagnosis:
         *step_error_note(effects),
         *_cost(found),
     ]
+    said = _main_sentence(c, verdict, h_before.held, h_after.held, remains=remains, has_model_error=bool(model_error))
+    if verdict == "unexplained" and recording_fault is None:
+        said += closest_candidate_sentence(explanation, groups)
+    if is_left:
+        said += clock_offset_sentence(clock_outliers(problem, explanation.fitted, asked.executor.parallel_map))
+    if recording_fault is None:
+        said += by_share(effects, shares, estimated=c.is_beside)
+    said += offered(law) + inconsistency_sentences(c.inconsistencies) + contradiction_clause(verdict, contrary)
+    said += tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found)
+    said += no_contact_clause(found)
     return Diagnosis(
         verdict=verdict,
-        sentence=(
-            recording_fault.sentence
-            if recording_fault is not None
-            else immaterial_sentence(c.slight)
-            if c.slight
-            else usual_model_error_sentence(asked.discrepancy.scales, explanation.p_value, len(found), _most(c))
-            if verdict == "no-mismatch" and asked.discrepancy is not None and c.is_beside
-            else sentence(
-                verdict,
-                effects,
-                explanation.p_value,
-                h_before.held,
-                h_after.held,
-                found,
-                early,
-                remains=remains,
-                cross_validated=c.is_cross_validated,
-                beside=c.is_beside and bool(told_of),
-            )
-        )
-        + (
-            closest_candidate_sentence(explanation, groups)
-            if verdict == "unexplained" and recording_fault is None
-            else ""
-        )
-        + (clock_offset_sentence(clock_outliers(problem, explanation.fitted, executor.parallel_map)) if is_left else "")
-        + (by_share(effects, shares, estimated=c.is_beside) if recording_fault is None else "")
-        + offered(law)
-        + inconsistency_sentences(c.inconsistencies)
-        + contradiction_clause(verdict, contrary)
-        + tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found)
-        + no_contact_clause(found),
+        sentence=said,
         p_value=explanation.p_value if recording_fault is None else recording_fault.p_value,
         noise=noise(found),
         where=locations(before, found, depends_on.on) if is_mismatch else by_itself,
@@ -153,10 +114,54 @@ def reported(c: Conclusion) -> Diagnosis:
         answer=answer_of(
             verdict, c.grade, explanation.p_value, slight=bool(c.slight), is_beside=asked.discrepancy is not None
         ),
-        discrepancy=told_of,
+        discrepancy=model_error,
         by_itself=recording_fault is not None,
         posterior=_draws(c) if effects else None,
         probabilities=_probabilities(c, remains=remains),
+    )
+
+
+def _dependence(c: Conclusion, *, is_mismatch: bool) -> tuple[Dependence, tuple[Degree, ...]]:
+    """What the mismatch depends on, and of overturns the degrees of freedom by their share of it."""
+    problem, base = c.problem, c.explanation.base
+    if c.acts == "drop" and is_mismatch:
+        return dependence(problem, c.set_ups, base, c.asked.executor.parallel_map), ()
+    if c.acts != "rollover":
+        return Dependence(), ()
+    degrees = misfit_by_degree_of_freedom(c.set_ups, list(problem.dataset), [b.shift for b in base.blocks])
+    of_one = dependence_of_one(problem, base, c.explanation.before) if is_mismatch else None
+    of_motion = Dependence(shares=dependency(problem, base))
+    return of_motion if of_one is None or of_one.yields_to(of_motion) else of_one, degrees
+
+
+def _main_sentence(
+    c: Conclusion,
+    verdict: Verdict,
+    before: HeldOutMisfit,
+    after: HeldOutMisfit,
+    *,
+    remains: bool,
+    has_model_error: bool,
+) -> str:
+    """The sentence on the verdict; `before` and `after` are the held-out misfits over the noise."""
+    explanation, found, discrepancy = c.explanation, list(c.problem.dataset), c.asked.discrepancy
+    if c.recording_fault is not None:
+        return c.recording_fault.sentence
+    if c.slight:
+        return immaterial_sentence(c.slight)
+    if verdict == "no-mismatch" and discrepancy is not None and c.is_beside:
+        return usual_model_error_sentence(discrepancy.scales, explanation.p_value, len(found), _most(c))
+    return sentence(
+        verdict,
+        c.effects,
+        explanation.p_value,
+        before,
+        after,
+        found,
+        (misfit_before_impact(found, explanation.base), misfit_before_impact(found, explanation.fitted)),
+        remains=remains,
+        cross_validated=c.is_cross_validated,
+        beside=c.is_beside and has_model_error,
     )
 
 

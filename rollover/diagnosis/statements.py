@@ -10,7 +10,7 @@ import numpy as np
 from rollover.comparison.rating import grade
 from rollover.diagnosis.data.condition_uncertainty import pulls
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.cross_validation import Groups, Held, held_out
+from rollover.diagnosis.fit.cross_validation import Groups, HeldOutMisfit, held_out
 from rollover.diagnosis.fit.ensemble_mean import refined_by_ensemble_mean
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
@@ -278,8 +278,8 @@ def sentence(
     verdict: Verdict,
     effects: Sequence[Named],
     p_value: float,
-    first: Held,
-    last: Held,
+    first: HeldOutMisfit,
+    last: HeldOutMisfit,
     dataset: Sequence[Dataset],
     early: tuple[float | None, float | None] = (None, None),
     *,

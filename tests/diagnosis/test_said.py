@@ -13,7 +13,7 @@ from rollover.diagnosis import statements
 from rollover.diagnosis.asked import finding_lines
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import drop_phases
-from rollover.diagnosis.fit.cross_validation import Held
+from rollover.diagnosis.fit.cross_validation import HeldOutMisfit
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.inference.scores import misfit_before_impact
@@ -47,13 +47,13 @@ def test_phases_need_no_depth_gauge() -> None:
 
 @pytest.mark.parametrize(("p", "said"), [(0.3, "agree within the noise (p = 0.3)"), (1e-9, "less than 0.1%")])
 def test_a_sure_but_negligible_effect_is_not_called_noise(p: float, said: str) -> None:
-    nothing = Held(chi2=np.ones(1), count=np.ones(1))
+    nothing = HeldOutMisfit(chi2=np.ones(1), count=np.ones(1))
     assert said in sentence("no-mismatch", (), p, nothing, nothing, [])
 
 
 def test_what_lies_within_a_tolerance_is_not_said_to_be_small() -> None:
     """5 % of a range for a noise of 0.1 %: a misfit of 4 % is tolerated."""
-    nothing = Held(chi2=np.ones(1), count=np.ones(1))
+    nothing = HeldOutMisfit(chi2=np.ones(1), count=np.ones(1))
     ((name, r),) = recorded({}, 4, speeds=(2.0,), channels=(FORCE,), noise=1e-3)
     exact = dataset_of(name, r, simulator_of(scenario(), r))
     assert exact is not None
@@ -91,7 +91,7 @@ def test_of_few_samples_before_the_blow_nothing_is_said(told: int, said: float |
 
 
 def test_a_misfit_with_scatter_or_a_remainder_is_reported() -> None:
-    first, last = (Held(chi2=np.array([left]), count=np.ones(1)) for left in (1.44, 0.64))
+    first, last = (HeldOutMisfit(chi2=np.array([left]), count=np.ones(1)) for left in (1.44, 0.64))
     tilted = Named(
         id="slope", kind="parameter", statement="The ground is inclined.", parameters={}, settings={}, channel=None,
         p_value=0.0, indistinguishable_from=(), discriminating_test="",

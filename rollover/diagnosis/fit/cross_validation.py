@@ -27,7 +27,7 @@ TUNING = SETTINGS.fit.cross_validation
 
 
 @dataclass(frozen=True, kw_only=True)
-class Held:
+class HeldOutMisfit:
     """Held-out misfit: `chi2` (k,) sum of squares over the noise of each recording, `count` (k,) that noise leaves."""
 
     chi2: Array
@@ -44,11 +44,11 @@ class Held:
         return float(np.sqrt(self.chi2.sum() / self.count.sum()))
 
 
-def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> Held:
+def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> HeldOutMisfit:
     """Predict each group of recordings by a fit to all the others; one group alone, or what is in none, by its own."""
     count = np.array([b.size for b in fitted.blocks], dtype=float)
     if fitted.cross_validated is not None:
-        return Held(chi2=np.array(fitted.cross_validated), count=count)
+        return HeldOutMisfit(chi2=np.array(fitted.cross_validated), count=count)
     normals = [b.normal() for b in fitted.blocks]
     left = np.array([max(c, 0.0) for _, _, c in normals])
     for group in groups:
@@ -57,7 +57,7 @@ def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> Held:
         for r in group:
             A, b, c = normals[r]
             left[r] = max(c - 2.0 * float(b @ dx) + float(dx @ A @ dx), 0.0)
-    return Held(chi2=left, count=count)
+    return HeldOutMisfit(chi2=left, count=count)
 
 
 def cross_validated(problem: Problem, fitted: Fitted, groups: Sequence[Sequence[int]]) -> Fitted:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rollover.comparison.rating import Iso18571, iso18571
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.cross_validation import Held, held_out
+from rollover.diagnosis.fit.cross_validation import HeldOutMisfit, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, time_shift_step
 from rollover.diagnosis.fit.time_shift import estimate_time_shifts
@@ -25,7 +25,7 @@ class Judged:
     """How well an explanation meets recordings: scores by "training" and "held_out", what is held out, and of each."""
 
     scores: Mapping[str, Score]
-    held: Held
+    held: HeldOutMisfit
     by_recording: tuple[tuple[str, float], ...]
 
 
