@@ -108,7 +108,7 @@ class Conclusion:
 def concluded(
     asked: Asked, every: Sequence[Dataset], inconsistencies: Sequence[Aside], notes: Sequence[str]
 ) -> Conclusion | Diagnosis:
-    """What recordings without what was left aside say; the diagnosis itself where there is too little to judge."""
+    """The conclusion from what was not excluded; the diagnosis itself where there is too little to judge."""
     scenario, hold_out = asked.scenario, asked.hold_out
     executor, began, names = asked.executor, asked.began, list(asked.recordings)
     assert scenario is not None
@@ -159,7 +159,7 @@ def conclusion_of(
     inconsistencies: Sequence[Aside] = (),
     notes: Sequence[str] = (),
 ) -> Conclusion:
-    """What an inquiry comes to beside a base: an explanation, whether it is named, and how much of all it explains.
+    """The conclusion of an inquiry beside a base: explanation, verdict, grade, and effects with their numbers.
 
     `validation` are recordings that were held out, `acts` what kind of test they are of.
     """

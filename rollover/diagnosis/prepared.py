@@ -30,7 +30,7 @@ from rollover.system.errors import InputError
 def prepared(
     scenario: Scenario, recordings: Sequence[tuple[str, Recording]], executor: Executor
 ) -> tuple[list[Dataset], list[str]]:
-    """Recordings as evidence, and what is to be said of them. Raises `InputError` where none of it is simulated."""
+    """Recordings as datasets, and notes on them. Raises `InputError` where none of it is simulated."""
     found, read, notes, foreign = [], [], [], []
     for name, whole in recordings:
         recording, spiked = without_spikes(whole)

@@ -281,7 +281,7 @@ class Dataset:
 
 
 def with_uncertain_conditions(e: Dataset, scenario: Scenario) -> Dataset:
-    """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
+    """The dataset with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
     return with_uncertain_conditions_at(
         replace(e, doubtful=tuple(nuisance_parameters(scenario, e.recording.uncertainty, e.name))), {}
     )

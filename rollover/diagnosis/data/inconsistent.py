@@ -1,4 +1,4 @@
-"""Slips of the pen: channels that stand in another unit than is stated, or with the opposite sign.
+"""Unit and sign errors: channels that stand in another unit than is stated, or with the opposite sign.
 
 Of what was measured, m, and what the simulation says, s, at the time shift at which the two are most alike,
 
@@ -36,7 +36,7 @@ SHIFTS = np.linspace(-TUNING.shift_width, TUNING.shift_width, TUNING.shift_steps
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Aside(ABC):
-    """What is left aside as no recording of what it states: a channel, or all of a recording as a channel shows."""
+    """What is excluded since it contradicts what it states: a channel, or all of a recording as a channel shows."""
 
     dataset: Dataset
     signal: Signal
@@ -66,7 +66,7 @@ class Inconsistency(Aside):
 
 
 def find_inconsistencies(every: Sequence[Dataset]) -> tuple[list[Inconsistency], list[Inconsistency]]:
-    """Slips that only some recordings of a channel have, and those that all of them share."""
+    """Unit and sign errors that only some recordings of a channel have, and those that all of them share."""
     met: dict[str, list[tuple[Dataset, Signal, float]]] = {}
     for e in every:
         made = e.simulator.predict({}, 0.0) or {}
@@ -87,7 +87,7 @@ def find_inconsistencies(every: Sequence[Dataset]) -> tuple[list[Inconsistency],
 
 
 def _is_chance(inconsistency: Inconsistency) -> bool:
-    """Whether runs that nobody could tell apart are less alike in its channel than a slip would have to be.
+    """Whether perturbed runs correlate less in its channel than a unit error would have to.
 
     Of an overturn straight backward, which way the vehicle falls at its end.
     """
@@ -101,14 +101,14 @@ def _is_chance(inconsistency: Inconsistency) -> bool:
 
 
 def without_inconsistent(every: Sequence[Dataset], inconsistencies: Sequence[Inconsistency]) -> list[Dataset]:
-    """The evidence without channels that are misread by an error of unit or sign, nor recordings of nothing else."""
+    """The dataset without channels that are misread by an error of unit or sign, nor recordings of nothing else."""
     aside = {(inconsistency.dataset.name, inconsistency.signal.channel) for inconsistency in inconsistencies}
     left = [replace(e, signals=tuple(s for s in e.signals if (e.name, s.channel) not in aside)) for e in every]
     return [e for e in left if e.signals] if aside else list(every)
 
 
 def inconsistency_sentences(found: Sequence[Aside]) -> str:
-    """What stands behind a verdict where channels were left aside; nothing where none was."""
+    """Sentences behind a verdict on channels that were excluded; empty where none was."""
     return "".join(f" {inconsistency.says()}" for inconsistency in found)
 
 
@@ -125,9 +125,9 @@ def relative_scale(e: Dataset, s: Signal, made: np.ndarray) -> float | None:
 
 
 def _usual_factor(channel: str, usual: float) -> float:
-    """Factor that is no slip's, of what the recordings of a channel usually are off by: what is missing makes it.
+    """Median factor of a channel's recordings that no unit error makes: missing physics does.
 
-    Where it is near no slip's, all of it.
+    Where it is near no unit error's, all of it.
     """
     known = (1.0, *(abs(cause) for cause, _ in _usual_unit_errors(describe(channel).unit)))
     near = min(known, key=lambda one: _log_distance(usual, one))
@@ -156,7 +156,7 @@ def _log_distance(factor: float, other: float) -> float:
 
 @cache
 def _usual_unit_errors(unit: str) -> tuple[tuple[float, str], ...]:
-    """(factor, what makes it) of each slip that a channel of this unit may have, the usual units first."""
+    """(factor, cause) of each error that a channel of this unit may have, the usual units first."""
     return tuple(_each(unit))
 
 

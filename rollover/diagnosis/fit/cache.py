@@ -1,4 +1,4 @@
-"""What recordings are predicted to be, at any point: simulated once, remembered, and made ahead side by side."""
+"""Predictions of recordings at any point: simulated once, cached, and made ahead in parallel."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MEMORY = SETTINGS.fit.notebook
 
 
 class Simulations:
-    """Evidence with a memory of what was simulated: the same values are never simulated twice."""
+    """Datasets with a cache of simulations: the same values are never simulated twice."""
 
     def __init__(self, dataset: Sequence[Dataset]) -> None:
         self.dataset = tuple(dataset)
@@ -40,7 +40,7 @@ class Simulations:
         self._discontinuities: dict[tuple[object, ...], NDArray[np.int64]] = {}
 
     def with_noise_model(self, dataset: Sequence[Dataset]) -> None:
-        """Take the same recordings with another noise: nothing is simulated again."""
+        """Take the same recordings under another noise model: nothing is simulated again."""
         self.dataset = tuple(dataset)
         self._known = Memory()
 

@@ -216,7 +216,7 @@ def beside(
 
 
 def moved_to(at: Point, k: int, value: float) -> list[float]:
-    """Coordinates with the k-th one elsewhere, and what follows it along a valley."""
+    """Coordinates with the k-th one elsewhere, and what follows it along a ridge."""
     x, ridge = [float(v) for v in at[1]], ridge_at(at, k)
     if ridge is not None:
         follows, slope = ridge

@@ -1,6 +1,6 @@
-"""Fits as jobs: worked off here or in child processes, and kept in a file until the diagnosis is done.
+"""The executor of fits: here or in child processes; results stay in a file until the diagnosis is done.
 
-A job depends on nothing but the recordings, their noise and its own start, so that the answer is the same for any
+A task depends on nothing but the recordings, their noise and its own start, so that the answer is the same for any
 number of workers, and a diagnosis that was interrupted takes up what it had fitted.
 """
 
@@ -29,9 +29,9 @@ WARM = "rollover.diagnosis.fit.warmup"
 
 
 class Executor:
-    """Works off jobs: in this process, or in `workers` children where more than one is asked for.
+    """Works off tasks: in this process, or in `workers` children where more than one is asked for.
 
-    `notebook` is a file that holds what is done, by key; `close` removes it.
+    `notebook` is a file of finished fits by task key; `close` removes it.
     """
 
     def __init__(self, workers: int = 1, notebook: Path | None = None, about: str = "") -> None:
@@ -74,7 +74,7 @@ class Executor:
             self.notebook.unlink(missing_ok=True)
 
     def fits(self, problem: Problem, tasks: Sequence[Task], say: Progress = lambda _: None) -> list[Fitted | None]:
-        """Fits in the order of the jobs; None where nothing could be simulated."""
+        """Fits in the order of the tasks; None where nothing could be simulated."""
         about = self._about(problem)
         found: list[Fitted | None] = [None] * len(tasks)
         keys = [task.key(about) for task in tasks]
@@ -140,11 +140,11 @@ class Executor:
         return [found[k] for k in range(len(items))]
 
     def _about(self, problem: Problem) -> str:
-        """What all fits depend on beside their jobs."""
+        """What all fits depend on beside their tasks."""
         return f"{self.about} {_fingerprint(problem)}"
 
     def _shared_file(self, problem: Problem, about: str) -> Path:
-        """A file with the judge for children to read, once each: megabytes for each of a thousand jobs take long."""
+        """A file with the problem, which each child reads once: megabytes for each of a thousand tasks take long."""
         if self._folder is None:
             self._folder = self._scratch.enter_context(scratch())
         path = Path(self._folder, hashlib.sha256(f"{about} {problem.shifts}".encode()).hexdigest())
@@ -177,7 +177,7 @@ def _no_link(path: str, flags: int) -> int:
 
 
 def work(problem: Problem, task: Task) -> Fitted | None:
-    """Work off one job."""
+    """The fit that a task asks for; None where nothing could be simulated."""
     if task.how == "fit":
         return problem.fit(
             task.candidates,
@@ -207,7 +207,7 @@ def work(problem: Problem, task: Task) -> Fitted | None:
 
 
 def _fingerprint(problem: Problem) -> str:
-    """Hash of the recordings as they are held: their samples, their noise, and whether they may have strayed."""
+    """Hash of the datasets: samples, noise, and whether a heavy tail is allowed for runs that diverge."""
     total = hashlib.sha256(repr(problem.heavy_tailed).encode())
     for e in problem.dataset:
         total.update(repr((e.name, e.shift_prior)).encode())
@@ -221,7 +221,7 @@ def _fingerprint(problem: Problem) -> str:
     return total.hexdigest()
 
 
-_held: dict[Path, Problem] = {}  # in a child: what it simulated for the job before
+_held: dict[Path, Problem] = {}  # in a child: the problem of its last task, with what it simulated
 
 
 def _begun(shared: Path) -> None:
@@ -243,7 +243,7 @@ def _mapped(case: tuple[Path, Callable[[Problem, Any], Any], list[Any]]) -> tupl
 
 
 def _problem_of(shared: Path) -> Problem:
-    """The judge of a file, with what it simulated before."""
+    """The problem of a file, with what this child has simulated for it."""
     if shared not in _held:
         _held.clear()
         _held[shared] = pickle.loads(shared.read_bytes())

@@ -154,7 +154,7 @@ class Problem(Simulations):
         marginalised = e.marginalised_beside(discontinuities)
         residual = marginalised(worth * (self.measured[r] - y))
         far = max(1.0, float(np.sqrt(np.mean(residual * residual)))) if 0.0 < fd_step <= self.effort.fine else np.inf
-        far = far if far < TUNING.local_slopes_below else np.inf  # from afar a wide step leads over ripples
+        far = far if far < TUNING.local_slopes_below else np.inf  # a wide step bridges local minima
 
         def off(end: Point) -> Array | None:
             return self.moved(r, (candidates, x), end, shift, None if self._fixed_shifts else slope)
@@ -339,7 +339,7 @@ class Problem(Simulations):
             has_no_jacobian = no_jacobian and (last or turn + 1 == rounds)
             fd_step = 0.0 if has_no_jacobian else self.effort.fine if last else fd_steps[width]
             # what is held already moves little: its slopes are worked out anew only where the search narrows, or where
-            # they lead astray or not far, as those of another place along a valley do; where a run is dear a short fit
+            # they lead astray or not far, as those of another point along a ridge do; where a run is dear a short fit
             # keeps all that predicted well, and another ends with those of a place beside it
             slow = gain < TUNING.reuse_least_share * due or gain < TUNING.reuse_least_gain * best
             anew = fresh or (slow and not self.effort.is_ensemble)

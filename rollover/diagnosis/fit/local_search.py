@@ -1,4 +1,4 @@
-"""Fits followed on where differences mislead: along crooked valleys, over edges in time, behind cliffs."""
+"""Local searches where finite differences mislead: along curved ridges, over edges in time, beyond discontinuities."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def ranked_by_misfit(
 
 
 def polish(problem: Problem, fitted: Fitted, size: float = 0.02, most: int = 45) -> Fitted:
-    """Follow a crooked valley by a simplex: where a threshold is crossed, differences mislead; never worse."""
+    """Follow a curved ridge by a simplex: where a threshold is crossed, differences mislead; never worse."""
     from scipy.optimize import minimize
 
     shifts = [b.shift for b in fitted.blocks]
@@ -153,7 +153,7 @@ def smallest_misfit(
 
 
 def with_time_shift_search(problem: Problem, fitted: Fitted) -> Fitted:
-    """The fit with each time shift tried out to either side: edges make its slope crooked; never worse.
+    """The fit with each time shift scanned to either side: edges bias its slope; never worse.
 
     Where one channel has a clock of its own all shifts are tried against that first: the edges of the channel stay.
     """

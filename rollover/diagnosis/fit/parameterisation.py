@@ -1,4 +1,4 @@
-"""An effect as it is looked for: what is fitted of it, over which ranges, and where looks and fits begin."""
+"""A candidate effect: which parameters are fitted, over which ranges, and where scans and fits begin."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Candidate:
 
     @cached_property
     def token(self) -> tuple[object, ...]:
-        """What tells the meaning of its coordinates from that of any other's."""
+        """Identity of its coordinates: candidates with the same token mean the same by them."""
         return (self.key, len(self.search), self.along, *self.variant.items())
 
     @property
@@ -63,12 +63,12 @@ class Candidate:
 
     @property
     def is_local(self) -> bool:
-        """Whether it tells only near its place."""
+        """Whether it acts only near one point of its range."""
         return bool(EFFECTS[self.id].narrow)
 
     @property
     def is_discontinuous(self) -> bool:
-        """Whether it does something at the least of its strength already."""
+        """Whether it acts at the least of its strength already."""
         return EFFECTS[self.id].is_discontinuous
 
     @property
@@ -78,15 +78,15 @@ class Candidate:
 
     @property
     def has_secondary(self) -> bool:
-        """Whether it is fitted in another shape or form than its usual one."""
+        """Whether secondary parameters are fitted too, or a variant of it is."""
         return bool(self.variant) or not set(self.search).isdisjoint(EFFECTS[self.id].shapes)
 
     def is_fine(self, k: int) -> bool:
-        """Whether the k-th parameter is that place: looked at in many, and over less about each."""
+        """Whether the k-th parameter says where a local effect acts: scanned finely, over less about each point."""
         return self.is_local and list(self.search)[k] == "travel"
 
     def ridge(self, x: Sequence[float], k: int) -> tuple[int, float] | None:
-        """Which coordinate follows the k-th one along the valley of a narrow effect at x, and how fast; else None.
+        """Which coordinate follows the k-th one along the ridge of a local effect at x, and how fast; else None.
 
         At a tilt theta a load slides by s, proportional to tan theta - mu, until a given moment:
         d ln s / d mu = -1/(tan theta - mu). Along that it meets its wall no sooner and no later.
@@ -116,7 +116,7 @@ class Candidate:
         return dict(found)
 
     def strength(self, x: Sequence[float]) -> float:
-        """How many times as strong as it usually is, by the parameter that is furthest from changing nothing."""
+        """How many times as strong as it usually is, by the parameter that is furthest from its null value."""
         usual, nulls = EFFECTS[self.id](), EFFECTS[self.id].null
         found = []
         for name, value in self.values(x).items():
@@ -126,7 +126,7 @@ class Candidate:
         return max(found, default=1.0)
 
     def starts(self) -> list[tuple[float, ...]]:
-        """Coordinates to look at first; the first of two parameters, a depth or a frequency, in the finer steps."""
+        """Coordinates of a start grid; the first of two parameters, a depth or a frequency, in the finer steps."""
         if self.null is not None:
             return self._beside(self.null)
         axes = []
@@ -145,7 +145,7 @@ class Candidate:
         return list(itertools.product(*axes))
 
     def _beside(self, null: tuple[float | None, ...]) -> list[tuple[float, ...]]:
-        """Few coordinates: a step to either side of what changes nothing, places spread where nothing is known to."""
+        """Few coordinates: a step to either side of the null value, a spread of points where there is none."""
         known = [k for k, n in enumerate(null) if n is not None]
         if len(known) == len(null):
             at = [float(n) for n in null if n is not None]
@@ -207,11 +207,11 @@ class Candidate:
         return replace(self, along=names), coordinates(values, self.search)
 
     def whole(self) -> Candidate:
-        """The same effect with its shape fitted too."""
+        """The same effect with its secondary parameters fitted too."""
         return replace(self, search={**self.search, **self.secondary}, secondary={})
 
     def variants(self) -> list[Candidate]:
-        """The same effect in its other forms, which are not fitted; none where it has a form or its shape is fitted."""
+        """Variants of the same effect; none of a variant, or where secondary parameters are fitted."""
         if self.has_secondary:
             return []
         found = []
@@ -221,14 +221,14 @@ class Candidate:
         return found
 
     def with_secondary(self, x: Sequence[float]) -> list[tuple[float, ...]]:
-        """Coordinates of `whole` at which its fit may begin: the shape's default, and others."""
+        """Coordinates of `whole` at which its fit may begin: the defaults of the secondary parameters, and others."""
         kind: Any = EFFECTS[self.id]()
         default = [_begun(getattr(kind, n), s) for n, s in self.secondary.items()]
         points = [tuple(default), *itertools.product(*[TUNING.shape_starts] * len(default))]
         return [(*x, *point) for point in points]
 
     def scan_points(self) -> list[tuple[float, ...]]:
-        """Coordinates to span the directions in which it begins: small where it has a zero, or spread, or `points`."""
+        """Coordinates to linearise at: close to the null value, or spread where there is none, or `points`."""
         if self.points:
             return list(self.points)
         if self.null is not None:

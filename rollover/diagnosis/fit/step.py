@@ -16,7 +16,7 @@ from rollover.diagnosis.fit.tasks import ParallelMap, Progress, R, T, Task, seri
 
 @dataclass(frozen=True, kw_only=True)
 class Screened:
-    """A candidate looked at on a few recordings: the best starts, what is left there, the gain of its best direction.
+    """A candidate screened on a few recordings: the best starts, the chi2 there, the gain of its best direction.
 
     `nrmse` is what a first fit leaves over the noise, 0 where there was none.
     """
@@ -39,13 +39,13 @@ class Step:
     screened: tuple[Screened, ...] = ()
 
     def again(self, problem: Problem) -> Step:
-        """The same under the noise as it is held now."""
+        """The same under the problem's present noise model."""
         return self._each(problem.again)
 
     def cross_validated(
         self, problem: Problem, groups: Groups, parallel_map: ParallelMap[Problem] = serial_map
     ) -> Step:
-        """The same with what its fits foretell by runs, where slopes do not hold for long; of drops its best alone."""
+        """The same with held-out predictions by refits, where slopes do not hold for long; of drops its best alone."""
         if problem.effort.is_ensemble:
             return self._each(lambda f: cross_validated(problem, f, groups))
         return self.moved_to(
@@ -75,7 +75,7 @@ class TaskRunner(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Inquiry:
-    """What every step of a selection is made with: recordings, effects, what is held out in turn, and who works."""
+    """What every step of a selection is made with: problem, candidates, groups held out in turn, and the executor."""
 
     problem: Problem
     candidates: Sequence[Candidate]

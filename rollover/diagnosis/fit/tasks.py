@@ -39,10 +39,10 @@ def serial_map(problem: Q, function: Callable[[Q, T], R], items: Sequence[T]) ->
 class Task:
     """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Problem.fit`.
 
-    One of few `rounds` is a first look: it ends without slopes.
-    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
-    `variant`, "time" tries out the time shifts, "trace" begins anew where it sets in, over a `stretch`. A shape or form
-    that comes nowhere near what the best fit `leaves` of each recording is not gone on with. `reused` as in
+    One of few `rounds` ends without slopes.
+    "polish" follows a curved ridge from a start, "shape" fits the secondary parameters of the last effect too or takes
+    a `variant` of it, "time" scans the time shifts, "trace" begins anew where it sets in, over a `stretch`. What comes
+    nowhere near what the best fit `leaves` of each recording is not gone on with. `reused` as in
     `Problem.fit`.
     """
 

@@ -123,7 +123,7 @@ def _best_start(
 
 
 def _along_frequency_ridge(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
-    """The fit of what rings begun anew with another shape, along the valley of its frequency; never worse."""
+    """An oscillatory effect refitted from other secondary parameters, along its frequency's ridge; never worse."""
     shifts, at = [b.shift for b in fitted.blocks], len(fitted.x) - len(fitted.own)
     variant, own = fitted.candidates[-1].reshaped(fitted.own)
     candidates, x = (*fitted.candidates[:-1], variant), (*fitted.x[:at], *own)

@@ -257,7 +257,7 @@ def _is_free_fall(problem: Problem, r: int, raw: Array | None, shift: float) -> 
 
 
 def _worth(s: Signal) -> float:
-    """What a sample of a coloured noise is worth of one of a white one."""
+    """Effective samples of one sample of autocorrelated noise."""
     return max(1.0 - sum(s.ar), 0.05) / (1.0 + max(sum(s.ar), 0.0))
 
 

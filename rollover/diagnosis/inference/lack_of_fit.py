@@ -8,11 +8,11 @@ Where runs scatter, samples are weighed (D3), and of S = |Q'w|^2 noise and scatt
 
     M = tr(Q'W^2 Q) + mean_k |Q'd_k|^2                                                                          (D14)
 
-d_k what neighbours differ by, each weighed by what the others scatter, as the recording is; the first term times what
-whitening leaves of slow noise (`colour.Rest`). Where another course is forgiven, both count after the impact for what
-they would in a recording that differs by d_k (D9). S/M then has nu = 2 M^2/var S degrees of freedom, var S from the
-noise, from noise and scatter together, and from how far the neighbours of a recording differ in all its cells at once;
-M is known as well as so few neighbours tell.
+d_k the deviations of the perturbed runs, each weighed by the scatter of the others, as the recording is; the first term
+times what whitening leaves of slow noise (`autoregression.Rest`). Where divergence after an impact is masked, both count
+after it for what they would in a recording that differs by d_k (D9). S/M then has nu = 2 M^2/var S degrees of freedom,
+var S from the noise, from noise and scatter together, and from how far the perturbed runs of a recording differ in all
+its cells at once; so few runs limit how well M is known.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ class Mismatch:
 def mismatch_of(
     dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], phases: Sequence[Sequence[tuple[float, str]]]
 ) -> Mismatch:
-    """Judge the residuals at a fitted point; `phases` are (start, name) for each recording."""
+    """Lack-of-fit test of the residuals at a fitted point; `phases` are (start, name) for each recording."""
     cells: list[Cell] = []
     perturbed = [leave_one_out_neighbours(e) for e in dataset]
     worth = [_worth(e, block, apart) for e, block, apart in zip(dataset, blocks, perturbed, strict=True)]

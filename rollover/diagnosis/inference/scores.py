@@ -30,7 +30,7 @@ class Judged:
 
 
 def judged(problem: Problem, fitted: Fitted, validation: Sequence[Dataset], groups: Sequence[Sequence[int]]) -> Judged:
-    """Judge an explanation by recordings that were kept from it, or without such by leaving conditions out in turn."""
+    """Scores of an explanation on recordings held out, or without such by leaving conditions out in turn."""
     every = range(len(problem.dataset))
     left = sum(b.normal()[2] for b in fitted.blocks)
     train = _score(

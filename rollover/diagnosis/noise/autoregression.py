@@ -31,7 +31,7 @@ ENOUGH = 2 * TUNING.least_windows * LENGTH  # samples that have as many
 
 
 def with_noise_of_quiet_stretches(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Dataset]:
-    """The evidence with its noise from the quiet stretches of the misfits (SI, stacked), recordings alike together."""
+    """The dataset with its noise from the quiet stretches of the misfits (SI, stacked), recordings alike together."""
     found = [list(e.signals) for e in dataset]
     humming = line_spectra(dataset, residuals)
     for members in signals_of_one_recorder(dataset):
@@ -86,7 +86,7 @@ def _before_the_impact(e: Dataset, s: Signal) -> slice:
 
 
 def with_noise_of_residuals(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Dataset]:
-    """The evidence with its noise from all of the misfits: an autoregression by least squares, recordings together."""
+    """The dataset with its noise from all of the misfits: an autoregression by least squares, recordings together."""
     found = [list(e.signals) for e in dataset]
     humming = line_spectra(dataset, residuals)
     shared: list[tuple[list[Member], list[Array]]] = []

@@ -45,7 +45,7 @@ TUNING = SETTINGS.noise.ensemble
 
 
 def with_sample_weights(e: Dataset, perturbed: Sequence[Mapping[str, Array]]) -> Dataset:
-    """The evidence with each sample's weight (D3); `perturbed` are the neighbours' deviations at its stamps."""
+    """The dataset with each sample's weight (D3); `perturbed` are the deviations of perturbed runs at its stamps."""
     first_impact = first_impact_of(e.simulator)
     perturbed = without_diverged(e, perturbed, first_impact)
     if not perturbed:

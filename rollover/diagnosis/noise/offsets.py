@@ -42,7 +42,7 @@ class Zero:
 def with_offsets_removed(
     dataset: Sequence[Dataset], residuals: Sequence[Array], shifts: Sequence[float]
 ) -> list[Dataset]:
-    """The evidence with its zeros set where they differ; `residuals` (stacked, SI) at time `shifts` (s)."""
+    """The dataset without channel offsets that differ; `residuals` (stacked, SI) at time `shifts` (s)."""
     by: dict[str, list[Zero]] = {}
     for r, (e, residual, shift) in enumerate(zip(dataset, residuals, shifts, strict=True)):
         for k, (s, part) in enumerate(e.spans()):

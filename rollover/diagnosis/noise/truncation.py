@@ -18,7 +18,7 @@ TUNING = SETTINGS.noise.truncation
 
 
 def shortened(e: Dataset, *, alone: bool = False) -> Dataset:
-    """The evidence without its end, where that counts little: long after an impact neighbours differ as effects do.
+    """The dataset without its end, where that counts little: long after an impact perturbed runs differ as effects do.
 
     As it is where samples are not weighed, and where the end counts or differs by more than chance does. Of a recording
     that is `alone` nothing after the impact is kept: whether an effect or another course of the run did it, only a

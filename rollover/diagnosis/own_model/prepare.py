@@ -1,4 +1,4 @@
-"""Recordings that drive a model: inputs at every stamp, outputs as evidence, noise; and the model tried on them."""
+"""Recordings that drive a model: inputs at every stamp, outputs as datasets, noise; and the model tried on them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TUNING = SETTINGS.fit.own_model
 
 
 def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tuple[list[Dataset], list[str]]:
-    """Recordings as evidence, and what is to be said of them. Raises `InputError` for those that cannot drive it.
+    """Recordings as datasets, and notes on them. Raises `InputError` for those that cannot drive it.
 
     Raises `FailedModelError` for a model that fails, or does not keep to what it declares, where fits begin.
     """
@@ -55,7 +55,7 @@ def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tu
 
 
 def with_noise(model: ForwardModel, every: Sequence[Dataset]) -> list[Dataset]:
-    """The evidence with its noise: as recordings state it, else from quiet stretches of all together."""
+    """The dataset with its noise: as recordings state it, else from quiet stretches of all together."""
     problem = Problem(every)
     base = begun(model, problem)
     if base is None:

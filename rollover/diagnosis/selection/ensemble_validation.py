@@ -102,7 +102,7 @@ def ensemble_validated(problem: Problem, found: Step, groups: Groups) -> Step | 
 
 
 def judged_before_impact(problem: Problem, found: Step) -> Step:
-    """A step judged by samples alone that no course a run may take has touched."""
+    """A step by its gain on samples before any run diverges."""
 
     def cut(f: Fitted) -> Fitted:
         blocks = [

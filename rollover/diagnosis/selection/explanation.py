@@ -32,8 +32,8 @@ class Explanation:
     """What was selected: the base, the fit (the base itself if nothing), a step for each of its effects.
 
     Each step's base is the fit without that effect, so that its rivals competed beside all the others. `first` is the
-    first step, taken or not; `scored` what all candidates scored beside the base; `detectable` the strength at which
-    each would have shown, beside the explanation for those that are not in it.
+    first step, taken or not; `scored` the score test of all candidates beside the base; `detectable` the strength at
+    which each would have shown, beside the explanation for those that are not in it.
     """
 
     base: Fitted
@@ -44,8 +44,8 @@ class Explanation:
     before: Mismatch
     after: Mismatch
     first: Step | None = None
-    refuted: bool = False  # whether the best candidate's gain did not outlast the scatter of its own runs
-    is_unique: bool = True  # whether as many effects as may be are these, and not any that can be bent to what is there
+    refuted: bool = False  # whether the best candidate's gain was not validated under the scatter of its own runs
+    is_unique: bool = True  # False where the effects keep being exchanged for others as good
 
     def refused(self) -> Explanation:
         """The same with nothing held to be found."""

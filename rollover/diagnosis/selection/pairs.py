@@ -227,7 +227,7 @@ def _with_secondary_fitted(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fi
 
 
 def _traced(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
-    """Pairs near the best of which one effect has a place, as a layer its depth, tried all along: one valley of many.
+    """Pairs near the best of which one effect has a threshold, as a layer its depth, scanned over all of its range.
 
     None where the best leaves no more than noise.
     """

@@ -1,4 +1,4 @@
-"""Looks at all candidates: where each costs a run on few recordings first, and by known runs where they will do."""
+"""Score test of all candidates: where runs are dear on few recordings first, and by cached runs where they suffice."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def score_test(
     beside: Fitted | None = None,
     parallel_map: ParallelMap[Problem] = serial_map,
 ) -> ScoreTest:
-    """Look at every candidate beside the base, in all recordings or `only` some, from the base's own time shifts.
+    """Score every candidate beside the base, in all recordings or `only` some, from the base's own time shifts.
 
     Directions are what candidates move `beside` another fit, where that is given: the null holds for any directions.
     `parallel_map` works them off.

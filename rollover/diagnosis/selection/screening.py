@@ -1,4 +1,4 @@
-"""Candidates looked at on a few recordings, in a few places each: which are worth a fit, and where it may begin."""
+"""Candidates screened on a few recordings at a few points each: which are worth a fit, and where it may begin."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ def screen(
     shifts: Sequence[float],
     scored: ScoreTest,
 ) -> list[Screened]:
-    """Look at each candidate in some places beside the base, on a few recordings, from time `shifts` (s) of all.
+    """Screen each candidate at some points beside the base, on a few recordings, from time `shifts` (s) of all.
 
-    Not far from an explanation the places to which `scored` leads are enough.
+    Not far from an explanation the points to which `scored` leads are enough.
     """
     problem = inquiry.problem
     beside = [problem.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]
@@ -94,7 +94,7 @@ def screen(
 
 @dataclass(frozen=True, kw_only=True)
 class _Screening:
-    """A candidate, where it is looked at, and where it may begin in any case."""
+    """A candidate, the points at which it is screened, and where it may begin in any case."""
 
     candidate: Candidate
     points: tuple[tuple[float, ...], ...]
