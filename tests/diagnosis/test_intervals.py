@@ -22,7 +22,7 @@ from rollover.proof.generator import make, plan
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
-from tests.diagnosis.test_refine import judge_of_case
+from tests.diagnosis.test_local_search import judge_of_case
 from tests.diagnosis.test_slopes import CHANNEL, LOAD, Late, dataset, first_impact
 
 

@@ -32,7 +32,7 @@ IDS = ("soil-crust", "guide-friction", "mass")
 def left(p_value: float, structure: float = 0.0) -> Mismatch:
     cell = Cell(
         recording=0, channel="c", phase="impact", start=0.0, end=1.0, rows=np.arange(0), p_value=p_value, excess=0.0,
-        structured=structure + 12.0, waves=12, rough=0.0, noise=(12.0, 0.0),
+        structured=structure + 12.0, waves=12, noise_power=0.0, noise=(12.0, 0.0),
     )  # fmt: skip
     return Mismatch(cells=(cell,), p_value=p_value, adjusted=())
 

@@ -9,7 +9,7 @@ Where runs scatter, samples are weighed (D3), and of S = |Q'w|^2 noise and scatt
     M = tr(Q'W^2 Q) + mean_k |Q'd_k|^2                                                                          (D14)
 
 d_k the deviations of the perturbed runs, each weighed by the scatter of the others, as the recording is; the first term
-times what whitening leaves of slow noise (`autoregression.Rest`). Where divergence after an impact is masked, both count
+times what whitening leaves of slow noise (`Rest`). Where divergence after an impact is masked, both count
 after it for what they would in a recording that differs by d_k (D9). S/M then has nu = 2 M^2/var S degrees of freedom,
 var S from the noise, from noise and scatter together, and from how far the perturbed runs of a recording differ in all
 its cells at once; so few runs limit how well M is known.

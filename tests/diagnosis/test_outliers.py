@@ -10,7 +10,7 @@ from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.spectral_lines import outlier_p_value, without_outliers
 from rollover.diagnosis.settings import SETTINGS
-from tests.diagnosis.test_chaos import SIGMA, STEP, N, dataset
+from tests.diagnosis.test_ensemble import SIGMA, STEP, N, dataset
 
 
 def loose(rng: np.random.Generator, n: int = N, ensemble_validated: int = 3) -> np.ndarray:

@@ -20,9 +20,9 @@ from rollover.diagnosis.selection.forward_step import _robust_short_fits
 from rollover.diagnosis.selection.screening import screen
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
-from tests.diagnosis import test_chaos
-from tests.diagnosis.test_chaos import STEP
-from tests.diagnosis.test_looks import CHANNEL, SLOPE, TIME, N, Wave, judge_of
+from tests.diagnosis import test_ensemble
+from tests.diagnosis.test_ensemble import STEP
+from tests.diagnosis.test_scan import CHANNEL, SLOPE, TIME, N, Wave, judge_of
 
 
 class Tipping(Wave):
@@ -117,15 +117,15 @@ def test_a_strong_effect_is_fitted_robustly_compared_in_full() -> None:
         effort = SETTINGS.forward.runs
 
         def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
-            x, time = changes.get("effects.slope.angle", 0.0), STEP * np.arange(test_chaos.N) - shift
+            x, time = changes.get("effects.slope.angle", 0.0), STEP * np.arange(test_ensemble.N) - shift
             early = x * np.sin(9.0 * time)
             return {
-                c: np.where(time < test_chaos.IMPACT, early, 4.0 * np.sin(150.0 * x + k) * np.cos(20.0 * time))
-                for k, c in enumerate(test_chaos.CHANNELS)
+                c: np.where(time < test_ensemble.IMPACT, early, 4.0 * np.sin(150.0 * x + k) * np.cos(20.0 * time))
+                for k, c in enumerate(test_ensemble.CHANNELS)
             }
 
     truth, rng, simulator = 0.7, np.random.default_rng(2), Parting()
-    quiet = replace(test_chaos.blown(), simulator=cast(Any, simulator))
+    quiet = replace(test_ensemble.blown(), simulator=cast(Any, simulator))
     dataset = []
     for _ in range(2):
         signals = []

@@ -14,8 +14,8 @@ from rollover.diagnosis.noise.heteroscedasticity import with_variance_model
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
-from tests.diagnosis.test_chaos import CHANNELS as CHASSIS
-from tests.diagnosis.test_chaos import IMPACT, blown
+from tests.diagnosis.test_ensemble import CHANNELS as CHASSIS
+from tests.diagnosis.test_ensemble import IMPACT, blown
 from tests.diagnosis.test_fits import judge_of
 from tests.physics.scenes import shipped
 

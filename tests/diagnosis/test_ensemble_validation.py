@@ -38,7 +38,7 @@ from rollover.diagnosis.selection.screening import of_same_family
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
 from rollover.effects import Search
-from tests.diagnosis.test_settle import CHANNEL, SLOPE, TIME, N, Rough, candidate, dataset
+from tests.diagnosis.test_medoid import CHANNEL, SLOPE, TIME, N, Rough, candidate, dataset
 
 
 def in_four(rng: np.random.Generator, sizes: Sequence[float]) -> Step:
