@@ -20,14 +20,13 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.forward_model import set_up
-from rollover.diagnosis.grades import graded, with_shares
+from rollover.diagnosis.grades import cannot_tell, graded, with_shares
 from rollover.diagnosis.inference.discrepancy import Discrepancy
 from rollover.diagnosis.inference.lack_of_fit import is_enough, is_tolerated, mismatch_of
 from rollover.diagnosis.inference.recording_faults import RecordingFault, intrinsic_faults, misread, truncation_fault
 from rollover.diagnosis.invariants import NAMING, clear_of_null, is_noise_alone, next_best, rejected_effects
 from rollover.diagnosis.noise.offsets import zero_notes
 from rollover.diagnosis.noise.truncation import truncation_notes
-from rollover.diagnosis.power import cannot_tell
 from rollover.diagnosis.prepared import weighted_datasets
 from rollover.diagnosis.result import Answer, Diagnosis, Named, Verdict
 from rollover.diagnosis.selection.candidates import candidates_of, size_of

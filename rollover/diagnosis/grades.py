@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time as clock
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,13 +13,16 @@ from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Groups, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
-from rollover.diagnosis.fit.parameterisation import Candidate, with_slices
-from rollover.diagnosis.result import Answer, Named, Share, Verdict
+from rollover.diagnosis.fit.parameterisation import Candidate, strength_parameter, with_slices
+from rollover.diagnosis.result import Answer, Diagnosis, Named, Share, Verdict
 from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.statements import noise
+from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.report.grades
+POWER = SETTINGS.report.power
 LOADS = ("force", "moment", "acceleration")  # in the names of channels that are loads, or tell one
 
 
@@ -158,3 +162,51 @@ def graded(
     alike = any(e.indistinguishable_from for e in effects)
     answer: Answer = "part" if remains else "likeness" if alike or is_beside else "whole"
     return answer, tuple(replace(e, answer="immaterial" if is_immaterial(e) else answer) for e in effects)
+
+
+def is_underpowered(detectable: Mapping[str, float]) -> bool:
+    """Whether even typical strengths of most effects would have stayed below what shows; of all, where no ground acts.
+
+    How many others there are is a matter of the vehicle, not of what its recordings tell.
+    """
+    typical = {
+        name: value
+        for name, value in detectable.items()
+        if name in EFFECTS and EFFECTS[name].kind == "physics" and None not in EFFECTS[name].null.values()
+    }  # of a limit, and of what the scenario has already, nothing is usual
+    blind = 0
+    for name, value in typical.items():
+        parameter, null = strength_parameter(name, EFFECTS[name].search)
+        usual = getattr(EFFECTS[name](), parameter, None)
+        blind += usual is None or value > abs(usual - null)
+    acts = any(channel.startswith("ground/") for name in typical for channel in EFFECTS[name].channels)
+    return blind > POWER.blind_share * len(typical) if acts else blind == len(typical)
+
+
+def cannot_tell(
+    dataset: Sequence[Dataset], names: Sequence[str], notes: Sequence[str], began: float, why: str = ""
+) -> Diagnosis:
+    """The answer where there is too little to judge."""
+    return Diagnosis(
+        verdict="cannot-tell",
+        sentence=f"There is too little in these recordings to be compared with the simulation.{why}",
+        p_value=1.0,
+        noise=noise(dataset),
+        where=(),
+        effects=(),
+        remaining_significant=False,
+        remaining_p_value=1.0,
+        remaining_where=(),
+        depends_on=None,
+        dependencies=(),
+        smallest_detectable={},
+        training=tuple(names),
+        held_out=(),
+        before={},
+        after={},
+        per_recording=(),
+        candidates=(),
+        simulations=0,
+        seconds=clock.perf_counter() - began,
+        notes=tuple(notes),
+    )

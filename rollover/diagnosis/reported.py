@@ -14,7 +14,7 @@ from rollover.diagnosis.fit.cross_validation import HeldOutMisfit
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.time_shift import clock_offset_sentence, clock_outliers
 from rollover.diagnosis.forward.full_run import full_runs
-from rollover.diagnosis.grades import answer_of, share_of
+from rollover.diagnosis.grades import answer_of, is_underpowered, share_of
 from rollover.diagnosis.inference.drop_dependence import Dependence, dependence, dependence_of_one
 from rollover.diagnosis.inference.lack_of_fit import is_enough, is_tolerated
 from rollover.diagnosis.inference.posterior import drawn
@@ -22,7 +22,6 @@ from rollover.diagnosis.inference.residual_law import offered, proposed
 from rollover.diagnosis.inference.scores import judged, misfit_before_impact
 from rollover.diagnosis.inference.vehicle_dependence import dependency, misfit_by_degree_of_freedom
 from rollover.diagnosis.planning.next_test import next_test
-from rollover.diagnosis.power import is_underpowered
 from rollover.diagnosis.probabilities import NOTHING, probabilities
 from rollover.diagnosis.result import Degree, Diagnosis, Draws, Named, Share, Verdict
 from rollover.diagnosis.settings import SETTINGS

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.diagnosis import diagnose, json_of, power
+from rollover.diagnosis import diagnose, grades, json_of
 from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
 
@@ -125,7 +125,7 @@ def test_recordings_that_contradict_each_other_are_not_explained() -> None:
 def test_recordings_that_show_no_usual_strength_are_too_weak(
     detectable: dict[str, float], is_underpowered: bool
 ) -> None:
-    assert power.is_underpowered(detectable) is is_underpowered
+    assert grades.is_underpowered(detectable) is is_underpowered
 
 
 def test_millimetres_stated_as_metres_are_a_channels_scale() -> None:

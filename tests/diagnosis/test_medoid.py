@@ -104,7 +104,7 @@ def test_a_shape_that_is_not_fitted_widens_an_interval(monkeypatch: pytest.Monke
 
 def test_no_neighbour_is_the_run_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     simulator = a_toss(monkeypatch, {})
-    place = simulator._place(SETTINGS.forward.run.perturbations[0].place)
+    place = simulator._grid_centre(SETTINGS.forward.run.perturbations[0].grid_offset)
     simulator.scenario = simulator.scenario.replaced({CENTRE: place})
     plain = simulator.scenario
     others = [plain.replaced(simulator._beside(one)) for one in SETTINGS.forward.run.perturbations]

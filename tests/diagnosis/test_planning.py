@@ -278,7 +278,7 @@ def test_a_rival_is_refitted_to_the_end() -> None:
     assert place is not None
     x = strength_with(a, place, lambda x: tests.unexplained(a, x), 12.0)
     assert x is not None
-    found, shown = tests.apart(a, x, b), tests.shown(a, x)
+    found, shown = tests.apart(a, x, b), tests.recorded(a, x)
     assert found is not None
     assert shown is not None
     for start in (found.x, (0.02,), (0.03,), (0.1,)):

@@ -15,7 +15,8 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.noise.ensemble import HeavyTail
-from rollover.diagnosis.selection import decision, scan
+from rollover.diagnosis.selection import scan
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.selection.score_test import ScoreTest, _best_amplitude, _birge_ratio, _visible, score_test
 from rollover.diagnosis.selection.screening import _begun_at, promising
 from rollover.diagnosis.settings import SETTINGS
@@ -292,9 +293,7 @@ def test_what_was_refuted_tells_nothing() -> None:
     problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
     scored = score_test(problem, base, [SLOPE])
     before: Any = type("M", (), {"p_value": 0.3})()
-    found = decision.Explanation(
-        base=base, fitted=base, parts=(), scored=scored, detectable={}, before=before, after=before
-    )
+    found = Explanation(base=base, fitted=base, parts=(), scored=scored, detectable={}, before=before, after=before)
     assert found.p_value < 1e-6
     assert replace(found, refuted=True).p_value == 0.3
 
@@ -314,9 +313,7 @@ def test_the_smaller_of_two_split_p_values_is_uniform(
     def told(before: float, look: float) -> float:
         one: Any = SimpleNamespace(p_value=before)
         other: Any = SimpleNamespace(p_value=lambda: look)
-        found = decision.Explanation(
-            base=base, fitted=base, parts=(), scored=other, detectable={}, before=one, after=one
-        )
+        found = Explanation(base=base, fitted=base, parts=(), scored=other, detectable={}, before=one, after=one)
         return found.p_value
 
     p = np.sort([told(*pair) for pair in rng.random((draws, 2))])

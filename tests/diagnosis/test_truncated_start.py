@@ -68,7 +68,7 @@ def taken(base: Fitted, found: Fitted) -> Taken:
     step = Step(base=base, fitted=found, p_value=0.0, rivals=(found,))
     left = Mismatch(p_value=0.0, cells=(), adjusted=())
     return Taken(
-        base=base, steps=(step,) if found.candidates else (), fitted=found, before=left, chi2=left, first=step,
+        base=base, steps=(step,) if found.candidates else (), fitted=found, before=left, after=left, first=step,
         at_first=cast(Any, None), scored=cast(Any, None),
     )  # fmt: skip
 

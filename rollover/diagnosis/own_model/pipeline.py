@@ -17,12 +17,12 @@ from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.step import Inquiry
 from rollover.diagnosis.forward.interface import FailedModelError
+from rollover.diagnosis.grades import cannot_tell
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.invariants import checked
 from rollover.diagnosis.own_model.declaration import BASELINE, ForwardModel, declared
 from rollover.diagnosis.own_model.prepare import begun, prepared_for, with_noise
 from rollover.diagnosis.own_model.tables import candidates_of_model, tables
-from rollover.diagnosis.power import cannot_tell
 from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis
 from rollover.recording import Recording

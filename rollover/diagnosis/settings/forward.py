@@ -37,7 +37,7 @@ class Effort:
 class Perturbation(NamedTuple):
     """Where the grid lies, of an element; its spacing and that of contact points over their own; parts of a step."""
 
-    place: tuple[float, float]
+    grid_offset: tuple[float, float]
     spacing: float = 1.0
     points: float = 1.0
     parts: int = 1
