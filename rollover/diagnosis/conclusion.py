@@ -111,7 +111,7 @@ def concluded(
     scenario, hold_out = asked.scenario, asked.hold_out
     executor, began, names = asked.executor, asked.began, list(asked.recordings)
     assert scenario is not None
-    notes = [*notes, *(inconsistency.says() for inconsistency in inconsistencies)]
+    notes = [*notes, *(inconsistency.message() for inconsistency in inconsistencies)]
     found = weighted_datasets(scenario, [e for e in every if e.name not in hold_out])
     validation = [e for e in weighted_datasets(scenario, every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < TUNING.least_samples:

@@ -86,7 +86,7 @@ class Overlay:
     condition: str = ""
 
 
-def series(
+def overlays_of(
     scenario: Scenario,
     recordings: Sequence[tuple[str, Recording]],
     found: Diagnosis,

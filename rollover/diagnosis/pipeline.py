@@ -94,10 +94,10 @@ def diagnose(
     if asked.discrepancy is not None:
         every = with_discrepancy(every, asked.discrepancy)
     inconsistent, shared = find_inconsistencies(every)
-    misstated = wrong_conditions([e for e in without_inconsistent(every, inconsistent) if e.name not in hold_out])
-    every = [e for e in every if e.name not in {one.dataset.name for one in misstated}]
+    wrong = wrong_conditions([e for e in without_inconsistent(every, inconsistent) if e.name not in hold_out])
+    every = [e for e in every if e.name not in {one.dataset.name for one in wrong}]
     usable = without_inconsistent(every, inconsistent)
-    first = concluded(asked, usable, [*inconsistent, *misstated], notes)
+    first = concluded(asked, usable, [*inconsistent, *wrong], notes)
     is_open = estimate == "unexplained" and not (reference or stated or general > 0.0)
     unexplained = first if is_open and isinstance(first, Conclusion) and first.verdict == "unexplained" else None
     if unexplained is not None and not shared:
@@ -108,7 +108,7 @@ def diagnose(
         if found.verdict == "unexplained" and shared:
             # a factor that all recordings of a channel share may hide what else is missing: once more without these
             left_out = [*inconsistent, *shared]
-            other = _diagnosed(asked, without_inconsistent(every, left_out), [*left_out, *misstated], notes)
+            other = _diagnosed(asked, without_inconsistent(every, left_out), [*left_out, *wrong], notes)
             found = other if other.effects else found
         if found.verdict == "unexplained" and unexplained is not None:
             found = _second_opinion(unexplained, usable, notes) or found

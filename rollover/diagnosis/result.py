@@ -92,7 +92,7 @@ class NextTest:
     rate: float
     probability: float
 
-    def says(self) -> str:
+    def message(self) -> str:
         """The sentence."""
         value = f"{self.value:g} {self.unit}".rstrip()
         return (

@@ -18,7 +18,7 @@ from rollover.diagnosis.noise.ensemble import (
     gained,
     has_diverged,
     heavy_tail,
-    leave_one_out_neighbours,
+    leave_one_out_scatter,
     memory,
     p_value_of_divergence,
     shares,
@@ -321,13 +321,13 @@ def test_a_neighbour_is_weighed_by_the_others() -> None:
     late = np.where(t > IMPACT, np.sin(40.0 * t), 0.0)
     perturbed = [dict.fromkeys(CHANNELS, a * late) for a in (0.3, -0.5, 0.9)]
     e = with_sample_weights(plain, perturbed)
-    found = leave_one_out_neighbours(e)
+    found = leave_one_out_scatter(e)
     for k, perturbed_run in enumerate(perturbed):
         others = with_sample_weights(plain, [d for d in perturbed if d is not perturbed_run])
         np.testing.assert_array_equal(found[k], others.whitened(e.raw(perturbed_run)))
     largest = e.whitened(e.raw(perturbed[2]))
     assert np.sum(found[2] ** 2) > 1.5 * np.sum(largest**2)
-    assert leave_one_out_neighbours(plain).shape == (0, plain.count)
+    assert leave_one_out_scatter(plain).shape == (0, plain.count)
 
 
 def test_a_neighbour_counts_as_a_recording_that_goes_like_it() -> None:

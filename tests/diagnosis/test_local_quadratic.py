@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from rollover.diagnosis.fit.linearisation import ResidualBlock
-from rollover.diagnosis.inference.local_quadratic import roughness_extents
+from rollover.diagnosis.inference.local_quadratic import local_quadratic_extents
 from rollover.diagnosis.noise.ensemble import HeavyTail
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ def reach(of: Callable[[float], list[Array] | None], seen: list[float] | None = 
     """By runs beside a fit whose slopes, across all that moves, are those of a dip."""
     seen = [] if seen is None else seen
     number = max([len(left) for left in map(of, (-1.0, 1.0)) if left is not None], default=1)
-    return roughness_extents(runs(of, seen), [1.96 * DIP] * number, DUE)
+    return local_quadratic_extents(runs(of, seen), [1.96 * DIP] * number, DUE)
 
 
 def straight(t: float, flatter: float, least: float = 0.0) -> list[Array]:
@@ -92,7 +92,7 @@ def test_slopes_that_the_mean_of_runs_has_too_are_believed(share: float, is_look
     """J = 1.96 a along a and beside it; the mean keeps a share of |J|^2."""
     across = np.sqrt(share - share**2)
     v = 1.96 * (share * DIP + across * ALONG)
-    found = roughness_extents(runs(lambda t: [-t * v], []), [1.96 * DIP], DUE)
+    found = local_quadratic_extents(runs(lambda t: [-t * v], []), [1.96 * DIP], DUE)
     assert found == pytest.approx((1.0 / np.sqrt(share),) * 2 if is_looked_at else (0.0, 0.0), rel=1e-9)
 
 
@@ -128,7 +128,7 @@ def test_samples_count_alike_at_all_places_and_no_clock_does() -> None:
             found.append([block(counts * plain, slope=counts * clock, prior=1e6, heavy_tail=heavy_tail)])
         return found
 
-    assert roughness_extents(met, [1.96 * DIP], DUE) == pytest.approx((3.0 / np.sqrt(0.68),) * 2, rel=1e-9)
+    assert local_quadratic_extents(met, [1.96 * DIP], DUE) == pytest.approx((3.0 / np.sqrt(0.68),) * 2, rel=1e-9)
 
 
 def test_what_was_measured_moves_as_runs_scatter() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.onset import clock_notes, zeros_from_contact
-from rollover.diagnosis.overlay import series
+from rollover.diagnosis.overlay import overlays_of
 from rollover.recording import Clock, Recording
 from rollover.system.errors import InputError
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
@@ -105,7 +105,7 @@ def test_what_is_missing_is_named_from_drops_that_nobody_timed() -> None:
     assert [e.id for e in found.effects] == ["soil-viscous-damping"]
     assert found.effects[0].parameters["damping"].value == pytest.approx(180.0, rel=0.02)
     assert sum("its clock has no zero" in line for line in found.notes) == 3
-    assert all(max(t.rms_after for t in one.tracks) < 1.2 for one in series(scenario(), given, found))
+    assert all(max(t.rms_after for t in one.tracks) < 1.2 for one in overlays_of(scenario(), given, found))
 
 
 def test_a_diagnosis_says_the_same_on_any_clock() -> None:

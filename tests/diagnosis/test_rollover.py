@@ -15,7 +15,7 @@ from rollover.diagnosis import diagnose
 from rollover.diagnosis.fit.parameterisation import Candidate, physical
 from rollover.diagnosis.forward import full_run
 from rollover.diagnosis.forward.full_run import RunSimulator
-from rollover.diagnosis.overlay import series
+from rollover.diagnosis.overlay import overlays_of
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics import simulate
@@ -72,11 +72,11 @@ def test_friction_that_was_left_out_is_named_and_fitted(monkeypatch: pytest.Monk
     assert found.where[0].phase in ("impact", "sliding")
     assert any("full runs" in note for note in found.notes)
     assert found.after["held_out"].nrmse < 0.8 * found.before["held_out"].nrmse
-    shown, children = series(toss(), given, found), Children(2)
+    shown, children = overlays_of(toss(), given, found), Children(2)
     with monkeypatch.context() as patch:
         patch.setattr(RunSimulator, "_run", lambda own, _, changes: own._known[full_run._key(changes)])
         try:
-            side_by_side = series(toss(), given, found, children)  # no run is made here
+            side_by_side = overlays_of(toss(), given, found, children)  # no run is made here
         finally:
             children.stop()
     for one, other in zip(shown, side_by_side, strict=True):

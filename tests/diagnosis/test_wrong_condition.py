@@ -44,7 +44,7 @@ def test_the_speed_that_was_dropped_at_is_told(missing: dict[str, Any], which: i
     [found] = wrong_conditions(every)
     assert found.dataset is every[which]
     assert found.speed == pytest.approx(SPEEDS[which], rel=0.1)
-    assert f"not at the stated {SPEEDS[which] / times:.3g} m/s; it was excluded" in found.says()
+    assert f"not at the stated {SPEEDS[which] / times:.3g} m/s; it was excluded" in found.message()
 
 
 @pytest.mark.parametrize(

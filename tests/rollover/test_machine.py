@@ -35,7 +35,7 @@ QUICK = ("import", "import parquet", "import mme", "synthesize", "view", "new", 
 QUICK += ("export", "export xlsx", "export mat", "export mme")
 WORK = (
     "rollover.diagnosis.asked.diagnosed_with_prechecks",
-    "rollover.diagnosis.overlay.series",
+    "rollover.diagnosis.overlay.overlays_of",
     "rollover.diagnosis.planning.plan.plan",
     "rollover.diagnosis.own_model.diagnose_model",
     "rollover.calibration.request.calibrate",

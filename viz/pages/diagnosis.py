@@ -224,7 +224,7 @@ def _next(found: Diagnosis) -> list[Block]:
             if e.discriminating_test:
                 blocks.append(Note(text=f"Measure next: {e.discriminating_test}."))
             if e.next_test is not None:
-                blocks.append(Note(text=f"By these recordings: {e.next_test.says()}."))
+                blocks.append(Note(text=f"By these recordings: {e.next_test.message()}."))
         else:
             confirm = f" To confirm it: {e.discriminating_test}." if e.discriminating_test else ""
             blocks.append(Note(text=f"{own}: no other candidate predicts the held-out recordings as well.{confirm}"))

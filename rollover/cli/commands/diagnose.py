@@ -158,7 +158,7 @@ def diagnose(
     )
     from rollover.diagnosis.fit.jobs import Executor
     from rollover.diagnosis.io import DRAWS, FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
-    from rollover.diagnosis.overlay import series
+    from rollover.diagnosis.overlay import overlays_of
     from rollover.spec import document
     from rollover.system.writing import notes
 
@@ -211,7 +211,7 @@ def diagnose(
             say=console.say,
             executor=executor,
         )
-        overlays = series(chosen, list(measured.items()), found, executor.children)
+        overlays = overlays_of(chosen, list(measured.items()), found, executor.children)
         answer = json_of(found, about, plain_findings(findings))
         with results.whole(folder) as part, ThreadPoolExecutor(1) as beside:
             results.write_json(part / JSON, answer)

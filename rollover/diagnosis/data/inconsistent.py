@@ -44,7 +44,7 @@ class Aside(ABC):
     summary: ClassVar[str]
 
     @abstractmethod
-    def says(self) -> str:
+    def message(self) -> str:
         """The sentence on it."""
 
 
@@ -57,7 +57,7 @@ class Inconsistency(Aside):
 
     summary = "Channels stand in another unit than is stated, or with the opposite sign."
 
-    def says(self) -> str:
+    def message(self) -> str:
         """The sentence on it."""
         return (
             f"{self.dataset.name}: {self.signal.channel} reads {spoken(self.factor)} times what is simulated, as if "
@@ -109,7 +109,7 @@ def without_inconsistent(every: Sequence[Dataset], inconsistencies: Sequence[Inc
 
 def inconsistency_sentences(found: Sequence[Aside]) -> str:
     """Sentences behind a verdict on channels that were excluded; empty where none was."""
-    return "".join(f" {inconsistency.says()}" for inconsistency in found)
+    return "".join(f" {inconsistency.message()}" for inconsistency in found)
 
 
 def relative_scale(e: Dataset, s: Signal, made: np.ndarray) -> float | None:

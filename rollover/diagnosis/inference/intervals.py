@@ -20,7 +20,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, at_an_end, time_shift_step
 from rollover.diagnosis.fit.local_search import linearised
 from rollover.diagnosis.fit.parameterisation import Candidate, physical, with_slices
-from rollover.diagnosis.inference.local_quadratic import roughness_extents, student_widening
+from rollover.diagnosis.inference.local_quadratic import local_quadratic_extents, student_widening
 from rollover.diagnosis.result import Interval
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, possible, units_of
@@ -250,7 +250,7 @@ def _within_range(problem: Problem, fitted: Fitted, wide: Array, dispersion: flo
 
 
 def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: float) -> Array:
-    """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `roughness_extents`.
+    """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `local_quadratic_extents`.
 
     In units of `own` deviations down and up, NaN where runs do not tell. It has in it what scatter and disagreement do.
     """
@@ -271,7 +271,9 @@ def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: 
             ]
             return [None if f is None else f.blocks for f in met]
 
-        estimated = roughness_extents(runs, [b.unweighted_J @ way for b in fitted.blocks], TWO_SIDED**2 * dispersion)
+        estimated = local_quadratic_extents(
+            runs, [b.unweighted_J @ way for b in fitted.blocks], TWO_SIDED**2 * dispersion
+        )
         if estimated is not None:
             found[k] = estimated
     return found

@@ -30,7 +30,7 @@ from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.noise.autoregression import Rest, line_spectra, rests
 from rollover.diagnosis.noise.ensemble import (
     has_diverged,
-    leave_one_out_neighbours,
+    leave_one_out_scatter,
     p_value_of_divergence,
     shares,
 )
@@ -103,7 +103,7 @@ def mismatch_of(
 ) -> Mismatch:
     """Lack-of-fit test of the residuals at a fitted point; `phases` are (start, name) for each recording."""
     cells: list[Cell] = []
-    perturbed = [leave_one_out_neighbours(e) for e in dataset]
+    perturbed = [leave_one_out_scatter(e) for e in dataset]
     worth = [_worth(e, block, apart) for e, block, apart in zip(dataset, blocks, perturbed, strict=True)]
     humming, colours = line_spectra(dataset, [b.residual_for_squares for b in blocks]), rests(dataset)
     for r, (e, block) in enumerate(zip(dataset, blocks, strict=True)):
@@ -163,14 +163,14 @@ def _worth(e: Dataset, block: ResidualBlock, perturbed: Array) -> Array:
     return np.where(e.early, 1.0, np.sqrt(shares(e, perturbed))[:, None])
 
 
-def _p_value(cells: Sequence[Cell], clocks: int) -> float:
-    """p-value of what is slow in several cells together, beside as many `clocks` that were fitted."""
+def _p_value(cells: Sequence[Cell], time_shifts: int) -> float:
+    """p-value of what is slow in several cells together, beside as many `time_shifts` that were fitted."""
     from scipy.special import fdtrc
 
     structured = sum(c.structured for c in cells)
     waves = sum(c.waves for c in cells)
     noise_power = sum(c.noise_power for c in cells)
-    count = sum(c.rows.size for c in cells) - waves - clocks
+    count = sum(c.rows.size for c in cells) - waves - time_shifts
     if not waves or count <= 0:
         return 1.0
     if all(c.noise[0] == c.waves for c in cells):

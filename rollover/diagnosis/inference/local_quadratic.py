@@ -47,7 +47,7 @@ def student_widening(free: float) -> float:
     return (float(stdtrit(free, 0.975)) / TUNING.normal_quantile) ** 2
 
 
-def roughness_extents(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[float, float] | None:
+def local_quadratic_extents(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[float, float] | None:
     """How far (t, down and up) the mean course of runs may be what was measured, by (R1) to (R3).
 
     `slopes` (n,) are those at the fit, of each recording by t, of samples that count in full. Nought both where they

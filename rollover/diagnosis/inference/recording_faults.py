@@ -111,8 +111,8 @@ def coarse(dataset: Sequence[Dataset], phases: Sequence[Sequence[tuple[float, st
     for s in (s for e in dataset for s in e.signals):
         values.setdefault(s.channel, []).append(s.values)
     least = {channel: COARSE.least_step * float(np.ptp(np.concatenate(v))) for channel, v in values.items()}
-    rough = [(r, e, s) for r, e in enumerate(dataset) for s in e.signals if s.step > least[s.channel]]
-    return tuple(whole(e, s, phases[r], 1.0 / len(rough)) for r, e, s in rough)
+    coarse_signals = [(r, e, s) for r, e in enumerate(dataset) for s in e.signals if s.step > least[s.channel]]
+    return tuple(whole(e, s, phases[r], 1.0 / len(coarse_signals)) for r, e, s in coarse_signals)
 
 
 def digit_sentence(locations: Sequence[Location], dataset: Sequence[Dataset]) -> str:

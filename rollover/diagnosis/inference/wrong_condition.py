@@ -36,7 +36,7 @@ class WrongCondition(Aside):
 
     summary = "What is stated of a recording is not what was tested."
 
-    def says(self) -> str:
+    def message(self) -> str:
         """The sentence on it."""
         stated = spoken(_speed(self.dataset))
         return (

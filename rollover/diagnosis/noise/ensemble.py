@@ -131,7 +131,7 @@ def heavy_tail(e: Dataset, residual: Array) -> HeavyTail | None:
     return HeavyTail(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * left)
 
 
-def leave_one_out_neighbours(e: Dataset) -> Array:
+def leave_one_out_scatter(e: Dataset) -> Array:
     """Neighbours (k, n), whitened, each weighed by what the others scatter: the recording is none of them either."""
     found = []
     for k, perturbed_run in enumerate(e.perturbed):

@@ -46,14 +46,14 @@ class Advice:
     tried: tuple[NextTest, ...]
     known: str
 
-    def says(self) -> str:
+    def message(self) -> str:
         """The sentence."""
         one, other = self.effects
         now = f"{one} and {other}: told apart with {self.probability:.0%}"
         if self.best is None:
             return f"{now} as planned."
         seldom = "" if self.is_enough else "; no single test that was looked at is sure to"
-        return f"{now} as planned; beside it {self.best.says()}{seldom}."
+        return f"{now} as planned; beside it {self.best.message()}{seldom}."
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -326,7 +326,7 @@ def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitt
         f
         for f in fits
         if held_out_disadvantage(f, fits[0], groups, shared)[0] < TUNING.simpler_errors
-        or held_out(f, groups).chi2.sum() < (1.0 + TUNING.roughness) * least
+        or held_out(f, groups).chi2.sum() < (1.0 + TUNING.arithmetic_share) * least
     ]
     first = min(near, key=lambda f: len(f.x))
     twins = [f for f in near if len(f.x) == len(first.x) and abs(f.chi2 - first.chi2) < TUNING.same_misfit]

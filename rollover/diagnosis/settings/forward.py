@@ -63,7 +63,7 @@ class Discontinuities:
     visible_step: float = 3.0  # noise units: from it on a step may be a jump; chosen
     deciding_jump: float = 5.0  # noise units: from it on a known jump between two samples decides a fit; chosen
     large_jump: float = 50.0  # noise units: larger jumps have no instant that is right to the sample; chosen
-    neighbours: int = 3  # samples to either side, between whose values one beside a jump may lie; chosen
+    samples_to_side: int = 3  # samples to either side, between whose values one beside a jump may lie; chosen
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -59,7 +59,7 @@ class ForwardStep:
     rival_share: float = 0.4
     least_score: float = 0.05  # share of the best score: below it none is fitted where fits cost much; chosen
     polished_misfit: float = 100.0  # ratio to the best misfit: up to it a fit of two parameters is polished; chosen
-    roughness: float = 0.002  # share of the misfit that is arithmetic; chosen
+    arithmetic_share: float = 0.002  # share of the misfit that is arithmetic; chosen
     simpler_errors: float = 1.0  # standard errors within which the simpler one is preferred; chosen
     excluded_errors: float = 2.0  # standard errors beyond which a rival is excluded; chosen
     same_misfit: float = 0.3  # sum of squares over the noise: fits no further apart are one and the same; chosen
