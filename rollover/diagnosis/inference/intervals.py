@@ -257,8 +257,8 @@ def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: 
     found = np.full((own.size, 2), np.nan)
     for k, way in enumerate(_ways(fitted, own)):
 
-        def runs(multiples: Sequence[float], way: Array = way) -> list[Sequence[ResidualBlock] | None]:
-            points = [np.array(fitted.x) + t * way for t in multiples]
+        def runs(steps: Sequence[float], way: Array = way) -> list[Sequence[ResidualBlock] | None]:
+            points = [np.array(fitted.x) + t * way for t in steps]
             inside = [bool(np.all((x >= 0.0) & (x <= 1.0))) for x in points]
             problem.made_ahead(
                 (r, fitted.candidates, [float(v) for v in x])
@@ -266,14 +266,12 @@ def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: 
                 for r in range(len(fitted.blocks) if there else 0)
             )
             met = [
-                _clocked(problem, fitted, t * way) if there else None
-                for t, there in zip(multiples, inside, strict=True)
+                _clocked(problem, fitted, t * way) if there else None for t, there in zip(steps, inside, strict=True)
             ]
             return [None if f is None else f.blocks for f in met]
 
-        estimated = local_quadratic_extents(
-            runs, [b.unweighted_J @ way for b in fitted.blocks], TWO_SIDED**2 * dispersion
-        )
+        slopes = [b.unweighted_J @ way for b in fitted.blocks]
+        estimated = local_quadratic_extents(runs, slopes, TWO_SIDED**2 * dispersion)
         if estimated is not None:
             found[k] = estimated
     return found
