@@ -7,7 +7,7 @@ Of what was measured, m, and what the simulation says, s, at the time shift at w
 a is the factor between them, r how alike they are. No effect turns a channel round or makes 9.81 times as much of it in
 one recording: where |r| is near 1 and a, over what it is in the other recordings, is what the other sign or another
 unit makes, that is what happened. Such a channel tells nothing of what is missing, and what it misses would drown the
-rest: it is left aside, which is said. Where neighbouring runs (`chaos`) are no more alike, none can tell. What all
+rest: it is left aside, which is said. Where perturbed runs are no more alike, none can tell. What all
 recordings of a channel are too large by is its gain or scale, which is fitted; only if nothing is found beside that is
 it left aside too.
 """
