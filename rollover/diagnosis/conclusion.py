@@ -207,9 +207,9 @@ def conclusion_of(
     if is_open and is_noise_alone(problem, explanation, groups):
         verdict = "no-mismatch"
         notes.append(AS_NOISE)
-    enough = is_tolerated if is_beside else partial(is_enough, left=explanation.after)
-    left = not enough(problem, explanation.fitted)
-    grade, effects = graded(*with_shares(problem, explanation, effects, groups), is_beside=is_beside, remains=left)
+    enough = is_tolerated if is_beside else partial(is_enough, mismatch=explanation.after)
+    remains = not enough(problem, explanation.fitted)
+    grade, effects = graded(*with_shares(problem, explanation, effects, groups), is_beside=is_beside, remains=remains)
     slight = effects if asked.estimates and grade == "immaterial" else ()
     if asked.estimates and (slight or (effects and grade == "unexplained")):
         verdict, effects, explanation = "no-mismatch" if slight else "unexplained", (), explanation.refused()

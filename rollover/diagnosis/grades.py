@@ -72,11 +72,11 @@ def jackknifed(gained: Array, due: Array, groups: Groups) -> Share:
     from scipy.special import stdtrit
 
     share = float(gained.sum() / due.sum())
-    left = np.array([float(np.sum(gained[list(g)] - share * due[list(g)])) for g in groups])
-    m = left.size
+    deviations = np.array([float(np.sum(gained[list(g)] - share * due[list(g)])) for g in groups])
+    m = deviations.size
     if m < 2:
         return Share(share=min(share, 1.0), low=-np.inf, high=1.0)
-    error = float(np.sqrt(m / (m - 1) * np.sum(left**2)) / due.sum())
+    error = float(np.sqrt(m / (m - 1) * np.sum(deviations**2)) / due.sum())
     wide = float(stdtrit(m - 1, TUNING.one_sided_confidence)) * error
     return Share(share=min(share, 1.0), low=share - wide, high=min(share + wide, 1.0))
 

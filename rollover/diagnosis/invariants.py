@@ -49,8 +49,8 @@ def rejected_effects(
     if after.total >= held_out(found.base, groups).total:
         return {e.id for e in effects}
     if not in_doubt:
-        left, rivals = float(after.chi2.sum()), found.first.rivals if found.first is not None else ()
-        better = any(not is_at_bound(f) and float(held_out(f, groups).chi2.sum()) < left for f in rivals)
+        chi2, rivals = float(after.chi2.sum()), found.first.rivals if found.first is not None else ()
+        better = any(not is_at_bound(f) and float(held_out(f, groups).chi2.sum()) < chi2 for f in rivals)
         return at_bounds(effects) if better else set()
     null = {e.id for e in effects if may_be_null(e)}
     if len(effects) == 1 and null and is_clear_of_null(problem, found.fitted):
@@ -139,16 +139,16 @@ def next_best(
     if first is None:
         return found.refused()
     start = float(held_out(first.base, groups).chi2.sum())
-    left = {f.label: float(held_out(f, groups).chi2.sum()) for f in first.rivals}
-    most = max((start - v for v in left.values()), default=0.0)
+    chi2 = {f.label: float(held_out(f, groups).chi2.sum()) for f in first.rivals}
+    most = max((start - v for v in chi2.values()), default=0.0)
     able = [
         f
         for f in first.rivals
-        if f.candidates[-1].id not in out and not is_at_bound(f) and start - left[f.label] > TUNING.rival_share * most
+        if f.candidates[-1].id not in out and not is_at_bound(f) and start - chi2[f.label] > TUNING.rival_share * most
     ]
     if not able:
         return found.refused()
-    one = replace(first, fitted=min(able, key=lambda f: left[f.label])).again(problem)
+    one = replace(first, fitted=min(able, key=lambda f: chi2[f.label])).again(problem)
     one, after = with_conditions_refitted(problem, one, mismatch_of(problem.dataset, one.fitted.blocks, phases), phases)
     return replace(found, parts=(one,), fitted=one.fitted, after=after, first=one)
 

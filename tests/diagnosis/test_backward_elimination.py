@@ -111,12 +111,12 @@ def test_the_strongest_is_that_without_which_most_is_left(monkeypatch: pytest.Mo
     """Of drops with the other fitted again, of full runs as it stands."""
     asked: list[tuple[list[str], list[float]]] = []
 
-    def left_at(_: Any, candidates: Any, x: Any, shifts: Any) -> float | None:
+    def chi2_at(_: Any, candidates: Any, x: Any, shifts: Any) -> float | None:
         asked.append(([c.id for c in candidates], x))
         assert shifts == [0.0]
         return {"soil-layer": 3.0, "soil-crust": None}[candidates[0].id]  # without the layer no run is to be had
 
-    monkeypatch.setattr(explanation, "left_at", left_at)
+    monkeypatch.setattr(explanation, "chi2_at", chi2_at)
     monkeypatch.setattr(explanation, "without_effect", lambda _, f, k, rounds: left(of(CRUST), 2.0 - k))
     problem = cast(Any, SimpleNamespace(effort=effort))
     held = replace(left(of(LAYER, CRUST), 1.0), x=(0.1, 0.2, 0.3, 0.4))

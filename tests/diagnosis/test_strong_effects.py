@@ -85,14 +85,14 @@ def test_a_start_worse_on_the_worst_recording_is_dropped(monkeypatch: pytest.Mon
     problem, base = tipped(20.0)
     problem.measured[2] = 1.5 * problem.measured[2]
     asked: dict[int, set[float]] = {1: set(), 2: set()}
-    left_at = scan.left_at
+    chi2_at = scan.chi2_at
 
     def counted(problem: Problem, candidates: Any, x: Any, shifts: Any, use: Any) -> float | None:
         for r in use:
             asked[r] |= {round(float(v), 9) for v in x}
-        return left_at(problem, candidates, x, shifts, use)
+        return chi2_at(problem, candidates, x, shifts, use)
 
-    monkeypatch.setattr(scan, "left_at", counted)
+    monkeypatch.setattr(scan, "chi2_at", counted)
     assert scan.strong_starts(problem, base, [SLOPE], [1, 2]) == {"slope": ((0.95,),)}
     assert asked[2] == {round(x, 9) for (x,) in SLOPE.strong()}
     assert asked[1] == {0.95}
@@ -102,10 +102,10 @@ def test_a_start_worse_on_the_worst_recording_is_dropped(monkeypatch: pytest.Mon
 def test_a_start_better_on_the_worst_recording_goes_to_all(
     full: float, masked: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def left_at(problem: Problem, candidates: Any, x: Any, *_: Any) -> float:
+    def chi2_at(problem: Problem, candidates: Any, x: Any, *_: Any) -> float:
         return 10.0 if not x else 30.0 if x != (0.95,) else masked if problem.heavy_tailed else full
 
-    monkeypatch.setattr(scan, "left_at", left_at)
+    monkeypatch.setattr(scan, "chi2_at", chi2_at)
     problem, base = tipped(20.0)
     assert scan.strong_starts(problem, base, [SLOPE], [1, 2]) == ({} if full == masked else {"slope": ((0.95,),)})
 

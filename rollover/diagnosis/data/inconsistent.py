@@ -103,8 +103,8 @@ def _is_chance(inconsistency: Inconsistency) -> bool:
 def without_inconsistent(every: Sequence[Dataset], inconsistencies: Sequence[Inconsistency]) -> list[Dataset]:
     """The dataset without channels that are misread by an error of unit or sign, nor recordings of nothing else."""
     aside = {(inconsistency.dataset.name, inconsistency.signal.channel) for inconsistency in inconsistencies}
-    left = [replace(e, signals=tuple(s for s in e.signals if (e.name, s.channel) not in aside)) for e in every]
-    return [e for e in left if e.signals] if aside else list(every)
+    remaining = [replace(e, signals=tuple(s for s in e.signals if (e.name, s.channel) not in aside)) for e in every]
+    return [e for e in remaining if e.signals] if aside else list(every)
 
 
 def inconsistency_sentences(found: Sequence[Aside]) -> str:

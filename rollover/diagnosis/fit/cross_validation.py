@@ -50,21 +50,21 @@ def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> HeldOutMisfit:
     if fitted.cross_validated is not None:
         return HeldOutMisfit(chi2=np.array(fitted.cross_validated), count=count)
     normals = [b.normal() for b in fitted.blocks]
-    left = np.array([max(c, 0.0) for _, _, c in normals])
+    chi2 = np.array([max(c, 0.0) for _, _, c in normals])
     for group in groups:
         dx = _leave_out_step(fitted, group)
         dx = np.clip(np.array(fitted.x) + dx, -0.25, 1.25) - np.array(fitted.x)
         for r in group:
             A, b, c = normals[r]
-            left[r] = max(c - 2.0 * float(b @ dx) + float(dx @ A @ dx), 0.0)
-    return HeldOutMisfit(chi2=left, count=count)
+            chi2[r] = max(c - 2.0 * float(b @ dx) + float(dx @ A @ dx), 0.0)
+    return HeldOutMisfit(chi2=chi2, count=count)
 
 
 def cross_validated(problem: Problem, fitted: Fitted, groups: Sequence[Sequence[int]]) -> Fitted:
     """A fit with the runs made that tell what it foretells of each group; as it was where one fails."""
     if not fitted.x:
         return fitted
-    left: list[float] = [b.normal()[2] for b in fitted.blocks]
+    chi2: list[float] = [b.normal()[2] for b in fitted.blocks]
     points = {
         r: np.clip(np.array(fitted.x) + _leave_out_step(fitted, group), 0.0, 1.0) for group in groups for r in group
     }
@@ -75,8 +75,8 @@ def cross_validated(problem: Problem, fitted: Fitted, groups: Sequence[Sequence[
         there = problem.clocked(r, fitted.candidates, [float(v) for v in x], shift, problem.effort.clocked)
         if there is None:
             return fitted
-        left[r] = there.normal()[2]
-    return replace(fitted, cross_validated=tuple(left))
+        chi2[r] = there.normal()[2]
+    return replace(fitted, cross_validated=tuple(chi2))
 
 
 def cross_validated_by_refits(
@@ -96,14 +96,14 @@ def cross_validated_by_refits(
     if not fitted.x or len(groups) < 2 or held_out(fitted, groups).total < doubted:
         return fitted
     shifts = [b.shift for b in fitted.blocks]
-    left = [b.normal()[2] for b in fitted.blocks]
+    chi2 = [b.normal()[2] for b in fitted.blocks]
     refit = partial(_held_out_refit, at=(fitted.candidates, fitted.x), shifts=shifts)
     for group, found in zip(groups, parallel_map(problem, refit, groups), strict=True):
         if found is None:
             return fitted
         for r, there in zip(group, found, strict=True):
-            left[r] = there
-    return replace(fitted, cross_validated=tuple(left))
+            chi2[r] = there
+    return replace(fitted, cross_validated=tuple(chi2))
 
 
 def _held_out_refit(
@@ -115,8 +115,8 @@ def _held_out_refit(
     if other is None:
         return None
     found = [problem.clocked(r, other.candidates, other.x, shifts[r], TUNING.shift_rounds) for r in group]
-    left = [there.normal()[2] for there in found if there is not None]
-    return left if len(left) == len(found) else None
+    chi2 = [there.normal()[2] for there in found if there is not None]
+    return chi2 if len(chi2) == len(found) else None
 
 
 def _leave_out_step(fitted: Fitted, group: Sequence[int]) -> Array:

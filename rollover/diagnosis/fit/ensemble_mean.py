@@ -108,8 +108,8 @@ def _line_search(problem: Problem, old: Fitted, dx: Array) -> tuple[Sequence[flo
         begun = [_moved_by(old, share * dx) for share in shares]
         problem.made_ahead((r, old.candidates, x) for x, _ in begun for r in range(len(old.blocks)))
         for x, shifts in begun:
-            left, moved = _misfit_and_shifts(problem, old.candidates, x, shifts)
-            met.append((left, (x, moved)))
+            chi2, moved = _misfit_and_shifts(problem, old.candidates, x, shifts)
+            met.append((chi2, (x, moved)))
         if met[0][0] < old.chi2:
             return met[0][1]
     least, best = min(met, key=lambda one: one[0])

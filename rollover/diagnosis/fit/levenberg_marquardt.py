@@ -390,10 +390,10 @@ class Problem(Simulations):
             found = [self._trial_block(r, candidates, there, b.shift) for r, b in each if b is not None]
             if there == trial or any(b is None for b in found):
                 break
-            left = total_of([b for b in found if b is not None])
-            if left >= total:
+            chi2 = total_of([b for b in found if b is not None])
+            if chi2 >= total:
                 break
-            trial, after, total = there, list(found), left
+            trial, after, total = there, list(found), chi2
         return trial, after, total
 
 

@@ -23,7 +23,7 @@ SPREAD = (
 SCANNED = (np.arange(TUNING.fine_secondary) + 0.5) / TUNING.fine_secondary  # places of a shape
 
 
-def left_at(
+def chi2_at(
     problem: Problem,
     candidates: Sequence[Candidate],
     x: Sequence[float],
@@ -59,7 +59,7 @@ def ranked_by_misfit(
     only: Sequence[int] | None = None,
 ) -> list[tuple[float, ...]]:
     """Those places that can be simulated, the one that leaves least of all recordings or `only` some first."""
-    met = [(there, x) for x in points if (there := left_at(problem, candidates, x, shifts, only)) is not None]
+    met = [(there, x) for x in points if (there := chi2_at(problem, candidates, x, shifts, only)) is not None]
     return [x for _, x in sorted(met)]
 
 
@@ -72,7 +72,7 @@ def polish(problem: Problem, fitted: Fitted, size: float = 0.02, most: int = 45)
     def left(x: Array) -> float:
         inside = [float(v) for v in np.clip(x, 0.0, 1.0)]
         out = float(np.sum(np.abs(x - np.array(inside))))
-        there = left_at(problem, fitted.candidates, inside, shifts)
+        there = chi2_at(problem, fitted.candidates, inside, shifts)
         return 1e300 if there is None else there * (1.0 + out)
 
     start = np.array(fitted.x)
@@ -141,14 +141,14 @@ def smallest_misfit(
     candidates, points = item
     least, best = np.inf, None
     for x in points:
-        left = 0.0
+        chi2 = 0.0
         for r, shift in enumerate(shifts):
             block = problem.block(r, candidates, x, shift, 0.0)
-            left += np.inf if block is None else block.normal()[2]
-            if left >= least:
+            chi2 += np.inf if block is None else block.normal()[2]
+            if chi2 >= least:
                 break
         else:
-            least, best = left, x
+            least, best = chi2, x
     return None if best is None else (least, best)
 
 
@@ -186,7 +186,7 @@ def ended(problem: Problem, fitted: Fitted) -> Fitted:
 
 def _against(problem: Problem, fitted: Fitted) -> tuple[tuple[float, ...], list[float]]:
     """Coordinates, and time shifts (s) of all, moved against the clock of each channel that has one of its own."""
-    best, left = (fitted.x, [b.shift for b in fitted.blocks]), fitted.total
+    best, chi2 = (fitted.x, [b.shift for b in fitted.blocks]), fitted.total
     for c, own in with_slices(fitted.candidates):
         if c.id != "sensor-clock-offset":
             continue
@@ -197,8 +197,8 @@ def _against(problem: Problem, fitted: Fitted) -> tuple[tuple[float, ...], list[
                 x, shifts = (*best[0][:k], moved, *best[0][k + 1 :]), [s + d for s in best[1]]
                 blocks = blocks_at(problem, fitted.candidates, x, shifts, clock=False) if 0.0 < moved < 1.0 else None
                 there = np.inf if blocks is None else sum(b.total for b in blocks)
-                if there < left:
-                    best, left = (x, shifts), there
+                if there < chi2:
+                    best, chi2 = (x, shifts), there
                     break
             else:
                 step *= TUNING.shift_step_factor

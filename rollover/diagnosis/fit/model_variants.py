@@ -72,9 +72,9 @@ def as_variant(problem: Problem, f: Fitted, last: Candidate, leaves: Sequence[fl
     return found if found is not None and found.chi2 < _extent_of_all(f, leaves) else None
 
 
-def enough(left: float, size: int) -> float:
+def enough(chi2: float, size: int) -> float:
     """The gain that pays for a shape where so much is left of so many samples."""
-    return TUNING.least_gain * max(1.0, left / size)
+    return TUNING.least_gain * max(1.0, chi2 / size)
 
 
 def is_noise(fitted: Fitted) -> bool:
@@ -144,8 +144,8 @@ def largest_useful_misfit(leaves: Sequence[float], size: int, part: float) -> fl
 
     As far again from the noise as that is, or `part` of the samples.
     """
-    left = sum(leaves)
-    return left + max((SETTINGS.fit.local_search.abandon_above - 1.0) * (left - size), part * size)
+    chi2 = sum(leaves)
+    return chi2 + max((SETTINGS.fit.local_search.abandon_above - 1.0) * (chi2 - size), part * size)
 
 
 def _extent_of_all(f: Fitted, leaves: Sequence[float]) -> float:

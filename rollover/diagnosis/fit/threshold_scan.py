@@ -9,7 +9,7 @@ import numpy as np
 from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, without_shift_direction
-from rollover.diagnosis.fit.local_search import blocks_at, left_at, representative_recordings
+from rollover.diagnosis.fit.local_search import blocks_at, chi2_at, representative_recordings
 from rollover.diagnosis.fit.parameterisation import Candidate, followed, strength_parameter
 from rollover.diagnosis.fit.tasks import Stretch
 from rollover.diagnosis.settings import SETTINGS
@@ -74,9 +74,9 @@ def threshold_starts(
     best, least = None, alone.total
     for point in second.scan_points():
         there = _matched_strength(problem, alone, second, (*x, *point), few)
-        left = None if there is None else left_at(problem, (*first, second), there, shifts, few)
-        if left is not None and left < least:
-            best, least = there, left
+        chi2 = None if there is None else chi2_at(problem, (*first, second), there, shifts, few)
+        if chi2 is not None and chi2 < least:
+            best, least = there, chi2
     return best
 
 
@@ -100,9 +100,9 @@ def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) ->
     for v in _scan_points(fitted, stretch):
         there = (*fitted.x[:k], float(v), *fitted.x[k + 1 :])
         x = there if is_clock(fitted) else _matched_strength(problem, alone, last, there, few)
-        left = None if x is None else left_at(problem, fitted.candidates, x, shifts, few)
-        if x is not None and left is not None:
-            met.append((left, x))
+        chi2 = None if x is None else chi2_at(problem, fitted.candidates, x, shifts, few)
+        if x is not None and chi2 is not None:
+            met.append((chi2, x))
     for x in _best_start(problem, fitted, _local_minima(met)[: TUNING.valleys], few):
         again = problem.fit(fitted.candidates, x, shifts=shifts, width=1)
         best = again if again is not None and again.chi2 < best.chi2 else best
@@ -129,7 +129,7 @@ def _along_frequency_ridge(problem: Problem, fitted: Fitted, stretch: Stretch) -
     candidates, x = (*fitted.candidates[:-1], variant), (*fitted.x[:at], *own)
     there = [(*x[: stretch[0]], v, *x[stretch[0] + 1 :]) for v in _scan_points(fitted, stretch)]
     few = representative_recordings(fitted)
-    met = [(left, y) for y in there if (left := left_at(problem, candidates, y, shifts, few)) is not None]
+    met = [(chi2, y) for y in there if (chi2 := chi2_at(problem, candidates, y, shifts, few)) is not None]
     best = fitted
     for y in _local_minima(met)[: TUNING.valleys]:
         new = problem.fit(candidates, y, shifts=shifts, width=1)

@@ -247,9 +247,9 @@ def _holm(p: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(v) for v in adjusted)
 
 
-def is_enough(problem: Problem, fitted: Fitted, left: Mismatch) -> bool:
+def is_enough(problem: Problem, fitted: Fitted, mismatch: Mismatch) -> bool:
     """Whether what a fit leaves is no more than chance, or not worth a word."""
-    return left.p_value > SETTINGS.inference.lack_of_fit.p_value or not matters(problem, fitted, left)
+    return mismatch.p_value > SETTINGS.inference.lack_of_fit.p_value or not matters(problem, fitted, mismatch)
 
 
 def matters(problem: Problem, base: Fitted, before: Mismatch) -> bool:

@@ -30,14 +30,14 @@ def drawn(problem: Problem, fitted: Fitted, count: int, seed: int = 0) -> Draws:
     A = sum((b.normal()[0] for b in blocks), np.zeros((p, p))) + GENTLE * np.eye(p)
 
     def log_density(x: Array) -> float:
-        prefix, left = [float(v) for v in x], 0.0
+        prefix, chi2 = [float(v) for v in x], 0.0
         for r, there in enumerate(blocks):
             found = problem.block(r, fitted.candidates, prefix, there.shift, 0.0, clock=False)
             if found is None:
                 return -np.inf
             g = float(there.slope @ found.residual) - found.shift * there.prior**-2
-            left += found.total - g * g / there.weight
-        return -0.5 * left / dispersion
+            chi2 += found.total - g * g / there.weight
+        return -0.5 * chi2 / dispersion
 
     covariance: Array = np.asarray(dispersion * np.linalg.inv(A), dtype=np.float64)
     made = sampled(log_density, np.array(fitted.x), covariance, draws=count, seed=seed)

@@ -32,9 +32,9 @@ class Judged:
 def judged(problem: Problem, fitted: Fitted, validation: Sequence[Dataset], groups: Sequence[Sequence[int]]) -> Judged:
     """Scores of an explanation on recordings held out, or without such by leaving conditions out in turn."""
     every = range(len(problem.dataset))
-    left = sum(b.normal()[2] for b in fitted.blocks)
+    chi2 = sum(b.normal()[2] for b in fitted.blocks)
     train = _score(
-        [_rated(problem, fitted, r) for r in every], float(np.sqrt(left / sum(b.size for b in fitted.blocks)))
+        [_rated(problem, fitted, r) for r in every], float(np.sqrt(chi2 / sum(b.size for b in fitted.blocks)))
     )
     held = held_out(fitted, groups)
     rows = [(e.name, float(v)) for e, v in zip(problem.dataset, held.nrmse, strict=True)]

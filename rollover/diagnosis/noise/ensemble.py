@@ -127,8 +127,8 @@ def heavy_tail(e: Dataset, residual: Array) -> HeavyTail | None:
     expected, beyond, inside = found
     share = _share(expected, beyond)
     slope = TUNING.state_size / (TUNING.state_size + beyond)
-    left = float(np.sum(residual[inside] ** 2))
-    return HeavyTail(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * left)
+    chi2 = float(np.sum(residual[inside] ** 2))
+    return HeavyTail(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * chi2)
 
 
 def leave_one_out_scatter(e: Dataset) -> Array:
@@ -175,8 +175,8 @@ def _beyond(e: Dataset, squares: Array) -> tuple[float, float, NDArray[np.bool_]
         expected += own
     if len(over) < TUNING.least_channels:
         return None
-    left = float(np.sum(squares[inside]))
-    beyond = min(float(np.median(over)) * expected, left) - expected  # never more than there is
+    chi2 = float(np.sum(squares[inside]))
+    beyond = min(float(np.median(over)) * expected, chi2) - expected  # never more than there is
     return (expected, beyond, inside) if beyond > 0.0 else None
 
 

@@ -93,7 +93,7 @@ class Tests:
         recorded, far = found
         nearest = self._nearest(c, x, rival)
         if not nearest or nearest[0][0] > TUNING.beyond_doubt:
-            least = min([far, *(left for left, _ in nearest)])
+            least = min([far, *(chi2 for chi2, _ in nearest)])
             x_rival = nearest[0][1] if nearest else ()
         else:
             fits = [

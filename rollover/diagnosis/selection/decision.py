@@ -40,16 +40,16 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     """
     problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
     found = loading_first(inquiry, forward_selection(inquiry, base))
-    base, taken, left, current = found.base, list(found.steps), found.after, found.fitted
-    is_whole = is_enough(problem, current, left)
+    base, taken, mismatch, current = found.base, list(found.steps), found.after, found.fitted
+    is_whole = is_enough(problem, current, mismatch)
     is_open = not (problem.effort.is_ensemble or found.paired) and (not is_whole or len(taken) == MOST_EFFECTS)
     if found.first is not None and is_open:
         # two that leave what chance leaves are preferred to three that do
         both = best_subsets(inquiry, taken or [found.first], found.at_first, current, is_whole=is_whole)
         if both is not None:
-            (taken, left), current = both, both[0][-1].fitted
-            is_whole = is_enough(problem, current, left)
-    is_open = is_whole and len(taken) > 1 and may_be_named(problem, current, left)
+            (taken, mismatch), current = both, both[0][-1].fitted
+            is_whole = is_enough(problem, current, mismatch)
+    is_open = is_whole and len(taken) > 1 and may_be_named(problem, current, mismatch)
     retained = _fully_fitted_steps(inquiry, taken) if is_open else _one_each(inquiry, taken)
     parts = [s.again(problem) for s in taken] if retained is None else retained
     if is_open and retained is not None and not problem.effort.is_ensemble:
@@ -73,11 +73,11 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     )
 
 
-def may_be_named(problem: Problem, fitted: Fitted, left: Mismatch) -> bool:
+def may_be_named(problem: Problem, fitted: Fitted, mismatch: Mismatch) -> bool:
     """Whether several effects may be named: all together leave no more than `verdict_on` asks, or one is needless."""
-    if problem.effort.is_ensemble or len(fitted.effects) < MOST_EFFECTS or left.p_value > FULL_P_VALUE:
+    if problem.effort.is_ensemble or len(fitted.effects) < MOST_EFFECTS or mismatch.p_value > FULL_P_VALUE:
         return True
-    if not matters(problem, fitted, left) or is_tolerated(problem, fitted):
+    if not matters(problem, fitted, mismatch) or is_tolerated(problem, fitted):
         return True
     return len(backward_elimination(problem, problem.again(fitted)).effects) < MOST_EFFECTS
 

@@ -12,8 +12,8 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import (
     all_but_one,
+    chi2_at,
     has_uncertain_conditions,
-    left_at,
     refitted_with_conditions,
     without_effect,
 )
@@ -79,27 +79,29 @@ def strongest(problem: Problem, base: Fitted, fitted: Fitted) -> Candidate:
             return c
         if problem.effort.is_ensemble:
             others, columns = all_but_one(fitted, k)
-            left = left_at(problem, others, [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks])
+            chi2 = chi2_at(problem, others, [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks])
         else:
             rest = without_effect(problem, fitted, k, rounds=4)
-            left = rest.chi2 if rest is not None else None
-        left = base.chi2 if left is None else left
-        if left > loss:
-            best, loss = c, left
+            chi2 = rest.chi2 if rest is not None else None
+        chi2 = base.chi2 if chi2 is None else chi2
+        if chi2 > loss:
+            best, loss = c, chi2
     return best
 
 
-def with_conditions_refitted(problem: Problem, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
+def with_conditions_refitted(
+    problem: Problem, found: Step, mismatch: Mismatch, phases: Phases
+) -> tuple[Step, Mismatch]:
     """A step and what it leaves; with the errors of the conditions as they act beside it if that leaves chance alone.
 
     Else these stay as they act on the scenario as it is: a wrong effect would bend them too.
     """
-    if is_enough(problem, found.fitted, left) or not has_uncertain_conditions(problem):
-        return found, left
+    if is_enough(problem, found.fitted, mismatch) or not has_uncertain_conditions(problem):
+        return found, mismatch
     before = problem.dataset
     new = refitted_with_conditions(problem, found.fitted)
     there = mismatch_of(problem.dataset, new.blocks, phases)
     if is_enough(problem, new, there):
         return found.moved_to(new), there
     problem.with_noise_model(before)
-    return found, left
+    return found, mismatch

@@ -152,12 +152,12 @@ def _restarted_from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted],
 
 def with_noise_of_fit(problem: Problem, fitted: Fitted, phases: Phases) -> bool:
     """Weigh the recordings by all that a fit leaves, if that is noise: as little as seen, or more without structure."""
-    left, count = fitted.chi2, sum(b.residual.size for b in fitted.blocks)
-    if left > TUNING.like_noise**2 * count:
+    chi2, count = fitted.chi2, sum(b.residual.size for b in fitted.blocks)
+    if chi2 > TUNING.like_noise**2 * count:
         return False
     before = problem.dataset
     problem.with_noise_model(autoregression.with_noise_of_residuals(before, problem.residuals(fitted)))
-    if left < TUNING.nearly_noise**2 * count:
+    if chi2 < TUNING.nearly_noise**2 * count:
         return True
     if (
         mismatch_of(problem.dataset, problem.again(fitted).blocks, phases).p_value

@@ -44,8 +44,8 @@ def best_subsets(
     pair = best_pair(inquiry, taken, scored)
     if pair is None:
         return None
-    found, left = followed(inquiry, pair)
-    if not is_enough(problem, found.fitted, left) and any(c.is_oscillatory for c in found.fitted.candidates):
+    found, mismatch = followed(inquiry, pair)
+    if not is_enough(problem, found.fitted, mismatch) and any(c.is_oscillatory for c in found.fitted.candidates):
         # what its shape shows now did not show beside another one
         ringing = (
             found.fitted
@@ -54,33 +54,35 @@ def best_subsets(
         )
         other = with_first_replaced(inquiry, ringing)
         if other is not None and other.fitted.chi2 < found.fitted.chi2:
-            found, left = followed(inquiry, other)
+            found, mismatch = followed(inquiry, other)
     if is_whole and costs(problem, found.fitted, current) > SETTINGS.selection.ensemble_validation.least_gain:
         return None  # noise that such a pair tells of would hold the third effect
-    if not is_enough(problem, found.fitted, left) and with_noise_of_fit(problem, found.fitted, inquiry.phases):
+    if not is_enough(problem, found.fitted, mismatch) and with_noise_of_fit(problem, found.fitted, inquiry.phases):
         found = found.again(problem)
-        left = mismatch_of(problem.dataset, found.fitted.blocks, inquiry.phases)
+        mismatch = mismatch_of(problem.dataset, found.fitted.blocks, inquiry.phases)
     if not (
-        left.p_value > SETTINGS.inference.lack_of_fit.p_value if is_whole else is_better(found.fitted, left, current)
+        mismatch.p_value > SETTINGS.inference.lack_of_fit.p_value
+        if is_whole
+        else is_better(found.fitted, mismatch, current)
     ):
         problem.with_noise_model(held)
         return None
-    return [replace(taken[0], fitted=found.base), found], left
+    return [replace(taken[0], fitted=found.base), found], mismatch
 
 
 def costs(problem: Problem, fewer: Fitted, more: Fitted) -> float:
     """What a fit of fewer effects leaves more than one of more, over what that leaves per sample."""
-    left = problem.again(more).chi2
-    return (fewer.chi2 - left) / max(1.0, left / sum(b.residual.size for b in more.blocks))
+    chi2 = problem.again(more).chi2
+    return (fewer.chi2 - chi2) / max(1.0, chi2 / sum(b.residual.size for b in more.blocks))
 
 
-def is_better(other: Fitted, left: Mismatch, current: Fitted, *, scattered: bool = False) -> bool:
+def is_better(other: Fitted, mismatch: Mismatch, current: Fitted, *, scattered: bool = False) -> bool:
     """Whether an explanation is to be taken instead of another: it leaves far less, or less and no more than chance.
 
     Far less of what is beyond the noise, or of all where runs are `scattered`, so that nobody knows what chance leaves.
     Instead of any curve, which will be refused, as much more will do.
     """
-    if left.p_value > SETTINGS.inference.lack_of_fit.p_value:
+    if mismatch.p_value > SETTINGS.inference.lack_of_fit.p_value:
         return other.chi2 < current.chi2
     if scattered:
         return other.chi2 < TUNING.better_share * current.chi2
@@ -96,8 +98,8 @@ def with_first_exchanged(
     other = with_first_replaced(inquiry, taken[-1].fitted)
     if other is None or other.fitted.chi2 >= taken[-1].fitted.chi2:
         return None
-    found, left = followed(inquiry, other)
-    return ([taken[-1], found], left) if is_better(found.fitted, left, current, scattered=True) else None
+    found, mismatch = followed(inquiry, other)
+    return ([taken[-1], found], mismatch) if is_better(found.fitted, mismatch, current, scattered=True) else None
 
 
 def with_first_replaced(inquiry: Inquiry, current: Fitted) -> Step | None:

@@ -12,9 +12,9 @@ from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.local_search import (
+    chi2_at,
     frequency_scan,
     grid_scan,
-    left_at,
     representative_recordings,
     separate_minima,
     smallest_misfit,
@@ -124,7 +124,7 @@ def _misfit_of_few(
     few: Sequence[int],
 ) -> float | None:
     """What is left of `few` recordings at x; None if a run fails."""
-    return left_at(problem, candidates, x, shifts, few)
+    return chi2_at(problem, candidates, x, shifts, few)
 
 
 def _refit_on_few(
@@ -181,7 +181,7 @@ def _best_middle(
 ) -> tuple[float, ...] | None:
     """Where a candidate leaves least of the middle recording of those places; None if nowhere less than `most`."""
     c, points = begun
-    met = [(left, x) for x in points if (left := _middle_at(problem, (*beside, c), x, shifts, most)) is not None]
+    met = [(chi2, x) for x in points if (chi2 := _middle_at(problem, (*beside, c), x, shifts, most)) is not None]
     return min(met)[1] if met else None
 
 
@@ -189,16 +189,16 @@ def _middle_at(
     problem: Problem, candidates: Sequence[Candidate], x: tuple[float, ...], shifts: Sequence[float], most: float
 ) -> float | None:
     """What the middle recording leaves per sample at x; None from `most` on, or where one cannot be simulated."""
-    left: list[float] = []
+    chi2: list[float] = []
     for r, shift in enumerate(shifts):
         block = problem.block(r, candidates, x, shift, 0.0)
         if block is None:
             return None
-        left.append(_per_sample(block))
+        chi2.append(_per_sample(block))
         # with so many beyond twice the most the middle one, or the mean of two, is beyond it
-        if 2 * sum(v >= 2.0 * most for v in left) >= len(shifts):
+        if 2 * sum(v >= 2.0 * most for v in chi2) >= len(shifts):
             return None
-    middle = float(np.median(left))
+    middle = float(np.median(chi2))
     return middle if middle < most else None
 
 

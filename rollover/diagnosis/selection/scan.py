@@ -11,7 +11,7 @@ import numpy as np
 from rollover.diagnosis.fit.cross_validation import Groups
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
-from rollover.diagnosis.fit.local_search import left_at
+from rollover.diagnosis.fit.local_search import chi2_at
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.fit.time_shift import with_shifts_near_prior
@@ -76,7 +76,7 @@ def strong_starts(
     shifts = initial_time_shifts(problem, base)
 
     def left(way: Sequence[Candidate], x: Sequence[float], use: Sequence[int]) -> float:
-        found = left_at(problem, (*base.candidates, *way), (*base.x, *x), shifts, use)
+        found = chi2_at(problem, (*base.candidates, *way), (*base.x, *x), shifts, use)
         return np.inf if found is None else found
 
     worst = max(few, key=lambda r: left((), (), [r]))

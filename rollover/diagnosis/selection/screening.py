@@ -26,9 +26,9 @@ def representative_few(
     base: Fitted, groups: Sequence[Sequence[int]], few: int = SETTINGS.forward.drops.few
 ) -> list[int]:
     """Few recordings that stand for all: of the conditions that are met worst, best, and in the middle."""
-    left = [b.normal()[2] / b.residual.size for b in base.blocks]
-    members = [max(g, key=lambda r: left[r]) for g in groups if g]
-    members.sort(key=lambda r: left[r])
+    misfits = [b.normal()[2] / b.residual.size for b in base.blocks]
+    members = [max(g, key=lambda r: misfits[r]) for g in groups if g]
+    members.sort(key=lambda r: misfits[r])
     if len(members) <= few:
         return sorted(set(members)) if len(groups) > 1 else list(range(len(base.blocks)))[:few]
     return sorted({members[round(k * (len(members) - 1) / (few - 1))] for k in range(few)})
@@ -114,13 +114,13 @@ def _screened(
     c, potential = item.candidate, 0.0
     looked_at: list[tuple[bool, float, tuple[float, ...]]] = []
     for start in item.points:
-        left, along, size, count = 0.0, 0.0, 0.0, 0
+        chi2, along, size, count = 0.0, 0.0, 0.0, 0
         for r, shift, block in zip(few, shifts, blocks, strict=True):
             there = problem.block(r, (*base[0], c), (*base[1], *start), shift, 0.0)
             if there is None:
                 break
             count += 1
-            left += there.normal()[2]
+            chi2 += there.normal()[2]
             way = block.counted(block.unweighted_residual - there.unweighted_residual)
             free = without_shift_direction(np.column_stack([way, block.residual]), block)
             along += float(free[:, 0] @ free[:, 1])
@@ -130,11 +130,11 @@ def _screened(
         is_still = size <= TUNING.no_change
         if not is_still:
             potential = max(potential, along * along / size)
-        looked_at.append((is_still, left, start))
+        looked_at.append((is_still, chi2, start))
     if not looked_at:
         return None
     # a fit finds no way from where nothing moves, however little less is left there than where too much does
-    met = [(left, start) for _, left, start in sorted(looked_at)]
+    met = [(chi2, start) for _, chi2, start in sorted(looked_at)]
     starts = tuple(dict.fromkeys((*item.far, *_begun_at(c, met))))
     return Screened(candidate=c, starts=starts, chi2=met[0][0], potential=potential)
 

@@ -28,23 +28,23 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     elsewhere.
     """
     problem, phases, old = inquiry.problem, inquiry.phases, found.fitted
-    left = mismatch_of(problem.dataset, old.blocks, phases)
+    mismatch = mismatch_of(problem.dataset, old.blocks, phases)
     is_near = old.chi2 < SETTINGS.selection.forward_step.nearly_noise**2 * sum(b.residual.size for b in old.blocks)
     if problem.effort.is_ensemble or not is_near:
-        return found, left
+        return found, mismatch
     if not is_over_flexible(old.effects):  # as they stand these will be refused, however well they fit
         new = with_thresholds_traced(inquiry, old)
-        if new.chi2 < old.chi2 or len(old.effects) > 1 or left.p_value < TUNING.full_p_value:
+        if new.chi2 < old.chi2 or len(old.effects) > 1 or mismatch.p_value < TUNING.full_p_value:
             new = with_time_shift_search(problem, polish(problem, new))
         new = ended(problem, new)
         if new.chi2 < old.chi2:
             found = _with_rivals(inquiry, found.moved_to(new))
-            left = mismatch_of(problem.dataset, new.blocks, phases)
+            mismatch = mismatch_of(problem.dataset, new.blocks, phases)
     for simple in (simpler, _with_usual_secondary, with_fewer_parameters):
         other = simple(inquiry, found)
         if other is not None:
-            found, left = other, mismatch_of(problem.dataset, other.fitted.blocks, phases)
-    return found, left
+            found, mismatch = other, mismatch_of(problem.dataset, other.fitted.blocks, phases)
+    return found, mismatch
 
 
 def simpler(inquiry: Inquiry, found: Step) -> Step | None:

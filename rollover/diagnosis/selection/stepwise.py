@@ -78,22 +78,22 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
     inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
     scored = first_scored = score_candidates(problem, base, candidates, groups, parallel_map=parallel_map)
 
-    def beside(fitted: Fitted, left: Mismatch) -> ScoreTest:
-        known = base if is_enough(problem, fitted, left) else None
+    def beside(fitted: Fitted, mismatch: Mismatch) -> ScoreTest:
+        known = base if is_enough(problem, fitted, mismatch) else None
         return rescored(problem, fitted, known, inquiry.free(fitted), groups, first_scored, parallel_map)
 
-    current, left = base, before
+    current, mismatch = base, before
     taken = list(begun)
     first = taken[0] if taken else None
     if taken:
         current = taken[-1].fitted
-        left = mismatch_of(problem.dataset, current.blocks, phases)
-        scored = beside(current, left)
+        mismatch = mismatch_of(problem.dataset, current.blocks, phases)
+        scored = beside(current, mismatch)
     refuted = paired = False
     for _ in range(SETTINGS.selection.flexibility.most_effects - len(begun)):
         if is_tolerated(problem, current):
             break
-        if scored.p_value() > TUNING.admitting_p_value and is_enough(problem, current, left):
+        if scored.p_value() > TUNING.admitting_p_value and is_enough(problem, current, mismatch):
             break
         if not taken and not problem.effort.is_ensemble and is_explained_by_clocks(problem, base, parallel_map):
             break
@@ -108,13 +108,13 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
         if found is None:
             refuted = not taken
             break
-        found, left = with_conditions_refitted(problem, *followed(inquiry, found), phases)
+        found, mismatch = with_conditions_refitted(problem, *followed(inquiry, found), phases)
         taken.append(found)
         current = found.fitted
         if not problem.heavy_tailed:
             current = with_full_weights(problem, current)
-            left = mismatch_of(problem.dataset, current.blocks, phases)
-        if len(taken) == 2 and not is_enough(problem, current, left):
+            mismatch = mismatch_of(problem.dataset, current.blocks, phases)
+        if len(taken) == 2 and not is_enough(problem, current, mismatch):
             # of two that are strong the first may have been taken for something else
             other = None
             if pairs and not problem.effort.is_ensemble:
@@ -122,22 +122,22 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
             elif problem.effort.is_ensemble and current.chi2 - count < TUNING.hopeless_share * (base.chi2 - count):
                 other = with_first_exchanged(inquiry, taken, current)
             if other is not None:
-                (taken, left), current = other, other[0][-1].fitted
+                (taken, mismatch), current = other, other[0][-1].fitted
         is_lost = len(taken) > 1 and (
             is_hopeless(problem, base, current) or is_third_unlikely(problem, taken[-1], current)
         )
         if is_lost or is_over_flexible(current.effects):
             break
-        scored = beside(current, left)
+        scored = beside(current, mismatch)
     if not problem.heavy_tailed:
         problem.heavy_tailed, current = True, problem.again(current)
-        left = mismatch_of(problem.dataset, current.blocks, phases)
+        mismatch = mismatch_of(problem.dataset, current.blocks, phases)
     return Taken(
         base=base,
         steps=tuple(taken),
         fitted=current,
         before=before,
-        after=left,
+        after=mismatch,
         first=first,
         at_first=first_scored,
         scored=scored,
