@@ -59,11 +59,9 @@ class Ensemble:
     full_weight: float = 0.99  # weight: channels above it everywhere are not reweighted; chosen
     state_size: int = 14  # numbers (d): dimension of the vehicle's state; position and velocity of a body, and an axle
     least_channels: int = 3  # channels: with fewer none is distinguished from another course; chosen
-    diverged_share: float = (
-        0.5  # share of a recording's full weight: below it the recording took another course; chosen
-    )
-    divergence_rate: float = 0.15  # probability of another course for one recording; chosen
-    divergence_p_value: float = 0.02  # p-value of the number of other courses: below it they are no chance; chosen
+    diverged_share: float = 0.5  # share of a recording's full weight: below it the recording has diverged; chosen
+    divergence_rate: float = 0.15  # probability that one recording diverges from its run; chosen
+    divergence_p_value: float = 0.02  # p-value of the number of diverged recordings: below it they are no chance; chosen
     least_perturbed: int = 2  # neighbours that show how far one more may go; chosen
     outlier_power: float = 9.0  # ratio to the neighbours' median power: beyond it one took another course; chosen
 
