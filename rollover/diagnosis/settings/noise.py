@@ -61,9 +61,9 @@ class Ensemble:
     least_channels: int = 3  # channels: with fewer none is distinguished from another course; chosen
     diverged_share: float = 0.5  # share of a recording's full weight: below it the recording has diverged; chosen
     divergence_rate: float = 0.15  # probability that one recording diverges from its run; chosen
-    divergence_p_value: float = 0.02  # p-value of the number of diverged recordings: below it they are no chance; chosen
-    least_perturbed: int = 2  # neighbours that show how far one more may go; chosen
-    outlier_power: float = 9.0  # ratio to the neighbours' median power: beyond it one took another course; chosen
+    divergence_p_value: float = 0.02  # p-value of the number that diverged: below it that is no chance; chosen
+    least_perturbed: int = 2  # perturbed runs that show how far one more may go; chosen
+    outlier_power: float = 9.0  # ratio to the median power of perturbed runs: beyond it one has diverged; chosen
 
 
 @dataclass(frozen=True, kw_only=True)
