@@ -31,17 +31,14 @@ class Candidate:
     family: str
     search: Mapping[str, Search]
     channel: str | None = None
-    null: tuple[float | None, ...] | None = None  # coordinates that change nothing; given where a place costs a run
-    secondary: Mapping[str, Search] = field(
-        default_factory=dict
-    )  # parameters fitted only where the misfit asks for them
+    null: tuple[float | None, ...] | None = None  # null coordinates, None where a parameter has none; of full runs only
+    # secondary parameters: fitted only where the misfit asks for them
+    secondary: Mapping[str, Search] = field(default_factory=dict)
     fixed: Mapping[str, Any] = field(default_factory=dict)  # parameters that are not fitted
-    variant: Mapping[str, float] = field(
-        default_factory=dict
-    )  # those of them that make another form of the same effect
+    variant: Mapping[str, float] = field(default_factory=dict)  # fixed parameters that make it a variant
     own: Mapping[str, float] = field(default_factory=dict)  # the scenario's values, where no number is an effect's null
-    points: tuple[tuple[float, ...], ...] = ()  # where it is looked at, if not wherever its `scan_points` are
-    along: tuple[str, ...] = ()  # of a fitted shape, at whose default all other coordinates are held: `Effect.reshaped`
+    points: tuple[tuple[float, ...], ...] = ()  # points that are scanned, if not `scan_points`
+    along: tuple[str, ...] = ()  # of a secondary parameter, at whose default all others are held: `Effect.reshaped`
     # no effect: what any explanation is fitted beside, see `Fitted.effects`; fits begin from its `points` as well
     is_baseline: bool = False
 
