@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from rollover.diagnosis.alone import alike_beside, fit_single_effect, verdict_on_single_effect
@@ -56,7 +56,8 @@ AS_NOISE = "what is left is 1.0 times the noise, or hardly more and before the f
 class Asked:
     """What a diagnosis was asked for, and when (s of the clock that counts).
 
-    `discrepancy` is what the scenario may miss beside what it lacks, once that is stated, taught or estimated.
+    `discrepancy` is what the scenario may miss beside what it lacks, once that is stated, taught or estimated; `bounds`
+    are the shares of a channel's range that one which is estimated cannot exceed.
     """
 
     scenario: Scenario | None  # None of a model of one's own
@@ -66,6 +67,7 @@ class Asked:
     executor: Executor
     began: float
     discrepancy: Discrepancy | None = None
+    bounds: Mapping[str, float] = field(default_factory=dict)
     estimates: bool = False  # whether a model error is estimated, and answers that it makes doubtful are refused
     draws: int = 0  # of the numbers of what is named
     is_timed: bool = False  # whether clocks were set right that are off by far more than they may be

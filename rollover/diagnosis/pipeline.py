@@ -30,11 +30,17 @@ from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis, Estimate
 from rollover.diagnosis.selection.explanation import Explanation
+from rollover.diagnosis.statements import is_hidden_by_tolerance
 from rollover.dynamics.drop_test import unfit
 from rollover.recording import Recording
 from rollover.recording.attitude import continuous
 from rollover.scenario import Scenario, load
 from rollover.spec.vehicle import Striker
+
+WITHIN_TOLERANCE = (
+    "the curves lie within the tolerance; it is the most that a scenario may miss them by, and what is named predicts"
+    " more of conditions held out than a discrepancy of that size does"
+)
 
 
 def diagnose(
@@ -53,20 +59,22 @@ def diagnose(
 
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
     out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss
-    it, of all or by channel: what is smaller counts as noise. `reference` names recordings of the same rig in which
-    nothing is suspected: they teach how far it misses, and are not diagnosed. With `estimate` that is estimated where
-    nothing explains the recordings (see `inference.discrepancy`), and the answer beside it is given where it says more:
-    if it is "unexplained" in place of that verdict alone, where neither of the others is stated; if it is True what
-    the estimate makes doubtful is not named either.
+    it, of all or by channel: what is smaller counts as noise, unless curves are poor by ISO/TS 18571: then it is the
+    bound of a discrepancy that is estimated, of drops. `reference` names recordings of the same rig
+    in which nothing is suspected: they teach how far it misses, and are not diagnosed. With `estimate` that is
+    estimated where nothing explains the recordings (see `inference.discrepancy`), and the answer beside it is given
+    where it says more: if it is "unexplained" in place of that verdict alone, where neither of the others is stated;
+    if it is True what the estimate makes doubtful is not named either.
     `posterior` draws of the numbers of what is named are made, of drops only.
     `executor` works off the fits, in children if it has any; the answer is the same. Raises `InputError` for an
     unknown condition, a clock that nothing tells the zero of, and recordings without any channel that is simulated;
     ``ValueError`` for a name in `hold_out` or `reference` that is none, a tolerance outside 0 to 1.
     """
     began = clock.perf_counter()
-    stated = dict(tolerance) if isinstance(tolerance, Mapping) else {}
-    general = 0.0 if isinstance(tolerance, Mapping) else tolerance
-    _check_options(recordings, hold_out, reference, general, stated)
+    names = [name for name, _ in recordings]
+    channels = list(dict.fromkeys(channel for _, r in recordings for channel in r.channels))
+    _refuse_unknown(names, {"hold_out": hold_out, "reference": reference})
+    general, stated = _shares(tolerance, channels)
     executor = executor or Executor()
     if posterior and unfit(scenario):
         raise ValueError("posterior: of drops only, got an overturn; 0 draws, or those of a calibration")
@@ -75,6 +83,7 @@ def diagnose(
     recordings, rounded = with_rounding_uncertainty(recordings) if is_drop else (recordings, [])
     every, notes = prepared(scenario, recordings, executor)
     notes += [*clock_notes(scenario, recordings, zeros), *rounded]
+    exact = every  # beside noise alone, whatever is tolerated
     every = [replace(e, model_error=float(np.hypot(e.model_error, general))) for e in every]
     asked = Asked(
         scenario=scenario,
@@ -112,29 +121,42 @@ def diagnose(
             found = other if other.effects else found
         if found.verdict == "unexplained" and unexplained is not None:
             found = _second_opinion(unexplained, usable, notes) or found
+    bounds = stated or (dict.fromkeys(channels, general) if general > 0.0 else {})
+    if estimate and not reference and bounds and is_hidden_by_tolerance(found):
+        used = {e.name for e in usable}
+        exact = without_inconsistent([e for e in exact if e.name in used], inconsistent)
+        found = _within_tolerance(replace(asked, bounds=bounds), exact, [*inconsistent, *wrong], notes) or found
     return checked(replace(found, clocks=zeros, seconds=clock.perf_counter() - began))
 
 
-def _check_options(
-    recordings: Sequence[tuple[str, Recording]],
-    hold_out: Sequence[str],
-    reference: Sequence[str],
-    general: float,
-    stated: Mapping[str, float],
-) -> None:
-    """Refuse names that are no recordings' or channels', and tolerances outside 0 to 1. Raises ``ValueError``."""
-    names = [name for name, _ in recordings]
-    for option, given in (("hold_out", hold_out), ("reference", reference)):
+def _refuse_unknown(names: Sequence[str], options: Mapping[str, Sequence[str]]) -> None:
+    """Raise ``ValueError`` for a name in an option that no recording has."""
+    for option, given in options.items():
         for name in given:
             if name not in names:
                 raise ValueError(f"{option}: no such recording, got {name!r}; {', '.join(names)}")
+
+
+def _shares(tolerance: float | Mapping[str, float], channels: Sequence[str]) -> tuple[float, dict[str, float]]:
+    """A tolerance as the share of all ranges and those by channel; ``ValueError`` for no share, or no channel."""
+    stated = dict(tolerance) if isinstance(tolerance, Mapping) else {}
+    general = 0.0 if isinstance(tolerance, Mapping) else tolerance
     for share in (general, *stated.values()):
         if not 0.0 <= share < 1.0:
             raise ValueError(f"tolerance: not a share of a range, got {share:g}; at least 0 and below 1")
-    channels = dict.fromkeys(channel for _, r in recordings for channel in r.channels)
     for channel in stated:
         if channel not in channels:
             raise ValueError(f"tolerance: no such channel recorded, got {channel!r}; {', '.join(channels)}")
+    return general, stated
+
+
+def _within_tolerance(
+    asked: Asked, every: Sequence[Dataset], inconsistencies: Sequence[Aside], notes: Sequence[str]
+) -> Diagnosis | None:
+    """What is named beside an estimated discrepancy of no more than is tolerated; None if nothing is."""
+    asked.say("what is tolerated may hide an effect: again beside a discrepancy of no more than that")
+    found = _diagnosed(replace(asked, discrepancy=None, estimates=True), every, inconsistencies, notes)
+    return replace(found, notes=(*found.notes, WITHIN_TOLERANCE)) if found.effects else None
 
 
 def _diagnosed(
@@ -172,14 +194,14 @@ def _beside_estimated_discrepancy(
     if asked.discrepancy is not None or found.acts != "drop":
         return None
     several = [tried.fitted] if len(tried.fitted.candidates) > 1 else []
-    learned = estimated(found.problem, tried.base, [*_rivals(tried), *several])
+    learned = estimated(found.problem, tried.base, [*_rivals(tried), *several]).at_most(asked.bounds)
     asked.say("a model is never exact: again beside a discrepancy of the size that explanations leave")
     other = concluded(
         replace(asked, discrepancy=learned), with_discrepancy(every, learned), found.inconsistencies, notes
     )
     if isinstance(other, Conclusion) and other.tried.first is not None:
         # fits held against noise alone are bent to what they cannot meet, and leave more than others would
-        again = estimated(other.problem, other.tried.base, _rivals(other.tried))
+        again = estimated(other.problem, other.tried.base, _rivals(other.tried)).at_most(asked.bounds)
         if learned.is_clearly_above(again):
             learned = again
             other = concluded(

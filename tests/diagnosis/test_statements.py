@@ -176,6 +176,21 @@ def test_many_findings_alike_are_counted() -> None:
     assert said == [*first, f"d1: {FORCE}: 6 more such findings (stuck)", f"d1: {FORCE}: spike 0"]
 
 
+def tolerant(is_tolerated: bool) -> SimpleNamespace:
+    """A recording with one signal, of which 5 % of its range are tolerated or nothing is."""
+    return SimpleNamespace(
+        signals=(None,), model_error_dominates=lambda _: is_tolerated, model_error_of=lambda _: 0.05 * is_tolerated
+    )
+
+
+@pytest.mark.parametrize(("peak", "told"), [(0.12, True), (-0.12, True), (0.04, False), (None, False)])
+def test_a_tolerance_that_lets_a_peak_pass_is_said(peak: float | None, told: bool) -> None:
+    score = Score(nrmse=0.8, iso18571=0.9, peak_force_error=peak)
+    said = statements.tolerance_clause("no-mismatch", 0.0, score, [tolerant(True)])  # type: ignore[list-item]
+    assert said.startswith(" A peak force is off by 12%: what is tolerated may hide") == told
+    assert bool(said) == told
+
+
 @pytest.mark.parametrize(
     ("verdict", "p_value", "iso", "is_tolerated", "told"),
     [
@@ -190,7 +205,7 @@ def test_many_findings_alike_are_counted() -> None:
 def test_a_tolerance_that_lets_poor_curves_pass_is_said(
     verdict: Any, p_value: float, iso: float | None, is_tolerated: bool, told: bool
 ) -> None:
-    dataset: Any = [SimpleNamespace(signals=(None,), model_error_dominates=lambda _: is_tolerated)]
+    dataset: Any = [tolerant(is_tolerated)]
     score = Score(nrmse=0.8, iso18571=iso, peak_force_error=None)
     said = statements.tolerance_clause(verdict, p_value, score, dataset)
     assert ("By ISO 18571 they are poor (0.52): what is tolerated may hide an effect" in said) == told

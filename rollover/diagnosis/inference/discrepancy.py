@@ -38,6 +38,10 @@ class Discrepancy:
         """Whether it is no larger than what models usually miss."""
         return max(self.scales.values(), default=0.0) <= TUNING.usual_most
 
+    def at_most(self, bounds: Mapping[str, float]) -> Discrepancy:
+        """The same with no scale above its channel's bound; a channel without one keeps its own."""
+        return replace(self, scales={c: min(s, bounds.get(c, s)) for c, s in self.scales.items()})
+
     def is_clearly_above(self, other: Discrepancy) -> bool:
         """Whether another estimate is clearly smaller in any channel."""
         return any(other.scales.get(c, s) < TUNING.refit_below * s for c, s in self.scales.items())
