@@ -164,46 +164,11 @@ def conclusion_of(
 
     `validation` are recordings that were held out, `acts` what kind of test they are of.
     """
-    problem, groups, phases, recordings = inquiry.problem, inquiry.groups, inquiry.phases, asked.recordings
-    found, notes = list(problem.dataset), list(notes)
+    problem, groups, notes = inquiry.problem, inquiry.groups, list(notes)
     is_beside = asked.discrepancy is not None and asked.discrepancy.is_estimated
-    if is_beside:
-        explanation = tried = fit_single_effect(inquiry, base)
-    else:
-        explanation = tried = explained(inquiry, base)
-
-    def decide(found: Explanation) -> tuple[Explanation, Verdict]:
-        return (
-            verdict_on_single_effect(problem, found, groups)
-            if is_beside
-            else verdict_on(problem, found, groups, phases)
-        )
-
-    def name_all(found: Explanation, verdict: str) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
-        alike = partial(alike_beside, problem, groups=groups) if is_beside else None
-        return _refitted_explanation(problem, found, verdict, validation, groups, phases, alike)
-
-    explanation, verdict = decide(explanation)
-    held, named_so = problem.dataset, name_all(explanation, verdict)
-    refuted: set[str] = set()
-    while (
-        more := redundant_effects(problem, named_so[0], interval_contains_null(named_so[1], problem.effort.is_ensemble))
-        - refuted
-    ):
-        # what may as well be nothing is none of it: what came first explains what there is alone, or nothing does
-        refuted |= more
-        problem.with_noise_model(held)
-        alone = by_first_effect(problem, explanation, refuted, phases)
-        explanation, verdict = decide(alone)
-        named_so = name_all(explanation, verdict)
-    while more := rejected_effects(problem, *named_so[:2], groups, in_doubt=asked.estimates) - refuted:
-        refuted |= more
-        problem.with_noise_model(held)
-        explanation, verdict = decide(next_best(problem, explanation, refuted, groups, phases))
-        named_so = name_all(explanation, verdict)
-    explanation, effects, validation = named_so
+    tried = fit_single_effect(inquiry, base) if is_beside else explained(inquiry, base)
+    explanation, verdict, effects, validation = _findings(asked, inquiry, tried, validation, is_beside=is_beside)
     effects = clear_of_null(problem, explanation, effects) if asked.estimates else effects
-    found = list(problem.dataset)
     # beside a discrepancy what is met is no more than that and noise: what is surely predicted all the same is more
     is_open = asked.estimates and verdict == "unexplained" and not is_beside
     if is_open and is_noise_alone(problem, explanation, groups):
@@ -215,18 +180,7 @@ def conclusion_of(
     slight = effects if asked.estimates and grade == "immaterial" else ()
     if asked.estimates and (slight or (effects and grade == "unexplained")):
         verdict, effects, explanation = "no-mismatch" if slight else "unexplained", (), explanation.refused()
-    recording_fault = None
-    if verdict == "no-mismatch":
-        recording_fault = intrinsic_faults(found, recordings, phases, explanation.p_value) or misread(
-            inconsistencies, len(found), explanation.p_value
-        )
-    elif effects and explains_little(explanation, groups, TUNING.main_share):
-        # what is lost again and again is met by no effect, and bends those that are fitted to it
-        recording_fault = truncation_fault(found, recordings, phases, explanation.p_value)
-        if recording_fault is not None and not (
-            explains_little(explanation, groups) or recording_fault.is_covered_by(e.channel for e in effects)
-        ):
-            recording_fault = None  # what another channel loses is no reason to doubt them
+    recording_fault = _recording_fault(asked, inquiry, explanation, verdict, effects, inconsistencies)
     if recording_fault is not None:
         verdict, effects = recording_fault.verdict, recording_fault.effects
         explanation = explanation.refused()
@@ -250,6 +204,70 @@ def conclusion_of(
         inconsistencies=tuple(inconsistencies),
         notes=tuple(notes),
     )
+
+
+def _findings(
+    asked: Asked, inquiry: Inquiry, tried: Explanation, validation: Sequence[Dataset], *, is_beside: bool
+) -> tuple[Explanation, Verdict, tuple[Named, ...], list[Dataset]]:
+    """What is named of an explanation: its verdict, the effects with their numbers, and the recordings for validation.
+
+    Effects whose work others do, that predict nothing, or that may be null are refuted one set after another, each time
+    from the noise model before any was named.
+    """
+    problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
+    alike = partial(alike_beside, problem, groups=groups) if is_beside else None
+
+    def decide(found: Explanation) -> tuple[Explanation, Verdict]:
+        return (
+            verdict_on_single_effect(problem, found, groups)
+            if is_beside
+            else verdict_on(problem, found, groups, phases)
+        )
+
+    def refit(found: Explanation, verdict: str) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
+        return _refitted_explanation(problem, found, verdict, validation, groups, phases, alike)
+
+    explanation, verdict = decide(tried)
+    held, refitted = problem.dataset, refit(explanation, verdict)
+    refuted: set[str] = set()
+    while (
+        more := redundant_effects(problem, refitted[0], interval_contains_null(refitted[1], problem.effort.is_ensemble))
+        - refuted
+    ):
+        # the first effect explains all alone, or nothing does
+        refuted |= more
+        problem.with_noise_model(held)
+        explanation, verdict = decide(by_first_effect(problem, explanation, refuted, phases))
+        refitted = refit(explanation, verdict)
+    while more := rejected_effects(problem, *refitted[:2], groups, in_doubt=asked.estimates) - refuted:
+        refuted |= more
+        problem.with_noise_model(held)
+        explanation, verdict = decide(next_best(problem, explanation, refuted, groups, phases))
+        refitted = refit(explanation, verdict)
+    explanation, effects, marginalised = refitted
+    return explanation, verdict, effects, marginalised
+
+
+def _recording_fault(
+    asked: Asked,
+    inquiry: Inquiry,
+    explanation: Explanation,
+    verdict: Verdict,
+    effects: Sequence[Named],
+    inconsistencies: Sequence[Aside],
+) -> RecordingFault | None:
+    """What recordings show by themselves where nothing is named, or losses where what is named explains little."""
+    found, p_value = list(inquiry.problem.dataset), explanation.p_value
+    if verdict == "no-mismatch":
+        fault = intrinsic_faults(found, asked.recordings, inquiry.phases, p_value)
+        return fault or misread(inconsistencies, len(found), p_value)
+    if not effects or not explains_little(explanation, inquiry.groups, TUNING.main_share):
+        return None
+    # what is lost again and again is met by no effect, and biases those that are fitted to it
+    fault = truncation_fault(found, asked.recordings, inquiry.phases, p_value)
+    is_theirs = fault is not None and fault.is_covered_by(e.channel for e in effects)
+    # what another channel loses is no reason to doubt them
+    return fault if is_theirs or explains_little(explanation, inquiry.groups) else None
 
 
 def _refitted_explanation(
