@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rollover.inputs.kinds import BrakeTorque, DriveTorque, Force, Input, Shake, Steering, TableAngle
 from rollover.spec.initiation import Driving, Initiation
+from rollover.spec.inputs.kinds import BrakeTorque, DriveTorque, Force, Input, Shake, Steering, TableAngle
 from rollover.spec.stand import TiltTable
 from rollover.spec.vehicle import RigidBody, Striker, Vehicle
 

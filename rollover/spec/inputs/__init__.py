@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rollover.inputs.fit import check_inputs
-from rollover.inputs.kinds import BrakeTorque, DriveTorque, Force, Input, Shake, Steering, TableAngle
-from rollover.inputs.signal import Signal, SignalFile
+from rollover.spec.inputs.fit import check_inputs
+from rollover.spec.inputs.kinds import BrakeTorque, DriveTorque, Force, Input, Shake, Steering, TableAngle
+from rollover.spec.inputs.signal import Signal, SignalFile
 
 __all__ = ["BrakeTorque", "DriveTorque", "Force", "Input", "Shake", "Signal", "SignalFile", "Steering", "TableAngle"]
 __all__ += ["check_inputs"]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from ground.kinds import ByKind
 from ground.quantity import Label, Quantity, parameters
-from rollover.inputs.signal import Signal, written
+from rollover.spec.inputs.signal import Signal, written
 from rollover.spec.shapes import Point
 
 Array3 = tuple[float, float, float]
