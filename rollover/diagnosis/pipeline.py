@@ -30,16 +30,18 @@ from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis, Estimate
 from rollover.diagnosis.selection.explanation import Explanation
-from rollover.diagnosis.statements import is_hidden_by_tolerance
+from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.statements import is_hardly_tolerated
 from rollover.dynamics.drop_test import unfit
 from rollover.recording import Recording
 from rollover.recording.attitude import continuous
 from rollover.scenario import Scenario, load
 from rollover.spec.vehicle import Striker
 
+HALF = SETTINGS.report.grades.half_share
 WITHIN_TOLERANCE = (
-    "the curves lie within the tolerance; it is the most that a scenario may miss them by, and what is named predicts"
-    " more of conditions held out than a discrepancy of that size does"
+    "the tolerance alone lets these curves pass; it is the most that a scenario may miss them by, and what is named"
+    " surely predicts half of the mismatch on conditions held out"
 )
 
 
@@ -59,12 +61,12 @@ def diagnose(
 
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
     out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss
-    it, of all or by channel: what is smaller counts as noise, unless curves are poor by ISO/TS 18571: then it is the
-    bound of a discrepancy that is estimated, of drops. `reference` names recordings of the same rig
-    in which nothing is suspected: they teach how far it misses, and are not diagnosed. With `estimate` that is
-    estimated where nothing explains the recordings (see `inference.discrepancy`), and the answer beside it is given
-    where it says more: if it is "unexplained" in place of that verdict alone, where neither of the others is stated;
-    if it is True what the estimate makes doubtful is not named either.
+    it, of all or by channel: what is smaller is none. Where it passes by chance alone or curves are poor, it bounds a
+    discrepancy that is estimated, and what surely predicts half of the mismatch is named (of drops). `reference` names
+    recordings of the same rig in which nothing is suspected: they teach how far it misses, and are not diagnosed. With
+    `estimate` that is estimated where nothing explains the recordings (see `inference.discrepancy`), and the answer
+    beside it is given where it says more: if it is "unexplained" in place of that verdict alone, where neither of the
+    others is stated; if it is True what the estimate makes doubtful is not named either.
     `posterior` draws of the numbers of what is named are made, of drops only.
     `executor` works off the fits, in children if it has any; the answer is the same. Raises `InputError` for an
     unknown condition, a clock that nothing tells the zero of, and recordings without any channel that is simulated;
@@ -122,7 +124,7 @@ def diagnose(
         if found.verdict == "unexplained" and unexplained is not None:
             found = _second_opinion(unexplained, usable, notes) or found
     bounds = stated or (dict.fromkeys(channels, general) if general > 0.0 else {})
-    if estimate and not reference and bounds and is_hidden_by_tolerance(found):
+    if estimate and not reference and bounds and is_hardly_tolerated(found):
         used = {e.name for e in usable}
         exact = without_inconsistent([e for e in exact if e.name in used], inconsistent)
         found = _within_tolerance(replace(asked, bounds=bounds), exact, [*inconsistent, *wrong], notes) or found
@@ -153,10 +155,15 @@ def _shares(tolerance: float | Mapping[str, float], channels: Sequence[str]) -> 
 def _within_tolerance(
     asked: Asked, every: Sequence[Dataset], inconsistencies: Sequence[Aside], notes: Sequence[str]
 ) -> Diagnosis | None:
-    """What is named beside an estimated discrepancy of no more than is tolerated; None if nothing is."""
+    """What is there beside an estimated discrepancy of at most what is tolerated; None if that may as well be all.
+
+    It surely predicts half of the mismatch: of an effect that resembles a background the interval of its share reaches
+    below.
+    """
     asked.say("what is tolerated may hide an effect: again beside a discrepancy of no more than that")
     found = _diagnosed(replace(asked, discrepancy=None, estimates=True), every, inconsistencies, notes)
-    return replace(found, notes=(*found.notes, WITHIN_TOLERANCE)) if found.effects else None
+    is_sure = any(e.explains is not None and e.explains.low >= HALF for e in found.effects) or found.answer == "whole"
+    return replace(found, notes=(*found.notes, WITHIN_TOLERANCE)) if is_sure else None
 
 
 def _diagnosed(

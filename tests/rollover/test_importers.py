@@ -272,3 +272,9 @@ def test_mme_of_another_laboratory(tmp_path: Path, packed: str, unit: str) -> No
 
 def test_names_of_importers() -> None:
     assert {"plain", "csv", "iso-mme", "mat", "tdms", "mdf", "hdf5", "mcap"} <= set(importers())
+
+
+def test_a_file_of_no_known_format_hears_of_published_sets(tmp_path: Path) -> None:
+    (tmp_path / "7.pt").write_bytes(b"\x80\x02}q\x00.")
+    with pytest.raises(InputError, match=r"no importer knows this file; .*--as one of cube-tosses"):
+        read_recording(tmp_path / "7.pt")

@@ -245,4 +245,5 @@ def _importer(path: Path, given: Described | None, kind: str) -> Importer:
     if given is not None:
         return CSV
     message = f"no importer knows this file; {', '.join(table)} are known, --profile says what its columns are"
+    message += f"; published sets are imported --as one of {', '.join(COLLECTIONS)}"
     raise InputError(Fault(file=str(path), message=message))
