@@ -284,13 +284,13 @@ def tolerance_clause(verdict: Verdict, p_value: float, score: Score | None, data
         return ""
     iso, peak = score.iso18571, score.peak_force_error or 0.0
     if iso is not None and grade(iso) == "poor":
-        shown = f"By ISO 18571 they are poor ({iso:.2f})"
+        said = f"By ISO 18571 they are poor ({iso:.2f})"
     elif abs(peak) > max(tolerated):
-        shown = f"A peak force is off by {abs(peak):.0%}"
+        said = f"A peak force is off by {abs(peak):.0%}"
     else:
         return ""
     return (
-        f" {shown}: what is tolerated may hide an effect; a smaller --tolerance,"
+        f" {said}: what is tolerated may hide an effect; a smaller --tolerance,"
         " or values known better than their stated uncertainty, may show it."
     )
 

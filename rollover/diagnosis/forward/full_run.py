@@ -77,8 +77,8 @@ def make(making: Making) -> Made:
         return Made(None, (), making.limit)
     if run.status == "failed":
         return Made(None, (), run.wall_time)
-    kept = {n: v for n, v in run.recording.channels.items() if n[:-1] in making.stems or n.startswith(MOTION)}
-    return Made((making.scenario.applied(), replace(run.recording, channels=kept)), run_phases(run), run.wall_time)
+    retained = {n: v for n, v in run.recording.channels.items() if n[:-1] in making.stems or n.startswith(MOTION)}
+    return Made((making.scenario.applied(), replace(run.recording, channels=retained)), run_phases(run), run.wall_time)
 
 
 class RunSimulator:

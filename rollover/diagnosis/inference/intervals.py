@@ -77,9 +77,9 @@ def shape_variance(problem: Problem, fitted: Fitted, inverse: Array) -> Array:
     for k in range(len(secondary)):
         pull = np.zeros(len(fitted.x))
         low, high = (min(max(begun[k] + s * EVENLY, 0.0), 1.0) for s in (-1.0, 1.0))
-        ends = [(whole, [*at, *begun[:k], v, *begun[k + 1 :]]) for v in (low, high)]
+        steps = [(whole, [*at, *begun[:k], v, *begun[k + 1 :]]) for v in (low, high)]
         for r, block in enumerate(fitted.blocks):
-            d = problem.moved(r, ends[0], ends[1], block.shift)
+            d = problem.moved(r, steps[0], steps[1], block.shift)
             if d is not None:
                 d = block.counted(d)
                 pull += block.J.T @ d - (block.J.T @ block.slope) * float(block.slope @ d) / block.weight
