@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import errno
+import functools
 import os
 import shutil
 import sys
@@ -108,8 +109,9 @@ def kept_under(file: Path) -> str:
     return hash_of([file], _COMPILER)
 
 
+@functools.cache
 def _of_runs() -> str:
-    """The same over all that compiles for a run."""
+    """The same over all that compiles for a run; four milliseconds, and the sources of a process stay."""
     folders = (ROOT / "ground", ROOT / "rollover" / "kernels")
     return hash_of([file for folder in folders for file in sorted(folder.glob("*.py"))], _COMPILER)
 

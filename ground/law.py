@@ -43,6 +43,8 @@ from ground.reference import REFERENCE_MASS as REFERENCE_MASS
 
 # places in an element's memory s
 SPEED, MASS, BRANCH, HIDDEN = 0, 1, 2, 3
+# of the sinkage where two branches cross: before it the first is the less, far beyond rounding, which spares a power
+BEFORE = 0.999
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ import math
 from typing import Annotated, Literal
 
 from ground.compiled import begin_law, force_law
-from ground.law import BRANCH, HIDDEN, SPEED, GroundLaw
+from ground.law import BEFORE, BRANCH, HIDDEN, SPEED, GroundLaw
 from ground.quantity import Quantity, parameters
 
 _K1, _C2 = HIDDEN, HIDDEN + 1  # hidden states: K_1 and the coefficient of K_2, worked out once for each touch
@@ -48,4 +48,6 @@ class Treated(GroundLaw):
         """K' z; written as z^(1+k) because z^k alone is infinite at z = 0 for a negative k."""
         if z <= 0.0:
             return 0.0
+        if p[_N2] < 0.0 and z < BEFORE * s[BRANCH]:
+            return s[_K1] * z
         return min(s[_K1] * z, s[_C2] * z ** (1.0 + p[_N2]))

@@ -12,7 +12,7 @@ import math
 from typing import Annotated, Literal
 
 from ground.compiled import begin_law, force_law
-from ground.law import BRANCH, HIDDEN, MASS, REFERENCE_AREA, REFERENCE_MASS, SPEED, Domain, GroundLaw
+from ground.law import BEFORE, BRANCH, HIDDEN, MASS, REFERENCE_AREA, REFERENCE_MASS, SPEED, Domain, GroundLaw
 from ground.quantity import Quantity, parameters
 
 MULTIPLE_CORRELATION = 0.923
@@ -52,6 +52,8 @@ class Ye2006(GroundLaw):
         """K' z, eq (3), with K' = min(K_b1, K_b2); z K_b2 is finite at z -> 0 though K_b2 is not."""
         if z <= 0.0:
             return 0.0
+        if p[_N2] < 0.0 and z < BEFORE * s[BRANCH]:
+            return s[_K1] * z
         return min(s[_K1] * z, s[_C2] * z ** (1.0 + p[_N2]))
 
     @property

@@ -16,6 +16,7 @@ from rollover.diagnosis.inference.repeated_course import predicted_by_others, qu
 from rollover.diagnosis.inference.residual_law import fitted_law
 from rollover.diagnosis.probabilities import credible, log_evidence
 from rollover.diagnosis.result import Verdict
+from rollover.diagnosis.selection.ensemble_validation import restarted_base
 from rollover.diagnosis.selection.explanation import Explanation, kind_of, with_conditions_refitted
 from rollover.diagnosis.selection.forward_step import by_chance, confusion_set, step
 from rollover.diagnosis.selection.scan import score_candidates
@@ -31,7 +32,8 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
     It is looked for though the discrepancy may be enough: that was estimated from what an effect leaves as well.
     """
     problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
-    base = with_time_shift_search(problem, base)
+    clocked = restarted_base if problem.effort.is_ensemble else with_time_shift_search
+    base = clocked(problem, base)
     before = mismatch_of(problem.dataset, base.blocks, phases)
     scored = score_candidates(problem, base, inquiry.candidates, groups, parallel_map=inquiry.executor.parallel_map)
     first = step(inquiry, base, scored)
@@ -79,7 +81,9 @@ def best_predictor(problem: Problem, one: Step, groups: Groups) -> Fitted:
     return max(level, key=lambda f: log_evidence(problem, f))
 
 
-def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:
+def verdict_on_single_effect(
+    problem: Problem, found: Explanation, groups: Groups, *, is_taught: bool = False
+) -> tuple[Explanation, Verdict]:
     """The verdict on what one effect explains beside a discrepancy.
 
     An effect predicts recordings that were held out, a discrepancy does not carry over to them but for what is common
@@ -87,6 +91,9 @@ def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Group
     more than the discrepancy; or surely more than a discrepancy lends itself to, and its family is not to be mistaken.
     Otherwise nothing is said to be there where the scenario alone leaves no more than the discrepancy, unless a part
     of that is surely predicted: something is there then that no name fits.
+
+    How large a discrepancy is that references taught is known without the effect: what surely predicts, by more than
+    that lends itself to, is named however much of it is left.
     """
     nothing: Verdict = "no-mismatch" if is_tolerated(problem, found.base) else "unexplained"
     if not found.parts or found.parts[0].p_value > SETTINGS.inference.lack_of_fit.p_value:
@@ -104,7 +111,7 @@ def verdict_on_single_effect(problem: Problem, found: Explanation, groups: Group
     is_sure = (
         whole is not None and whole.share >= TUNING.half_share and whole.low > TUNING.sure_share and len(families) == 1
     )
-    if is_enough or is_sure:
+    if is_enough or is_sure or (is_taught and whole is not None and whole.low > 0.0):
         return found, kind_of(found.fitted.candidates[-1])
     return found.refused(), nothing
 

@@ -102,8 +102,22 @@ class Conclusion:
 
     @property
     def is_beside(self) -> bool:
+        """Whether it was drawn beside a discrepancy that was estimated, or of full runs taught."""
+        return is_beside(self.asked, self.problem)
+
+    @property
+    def is_estimated(self) -> bool:
         """Whether it was drawn beside a discrepancy that was estimated."""
         return self.asked.discrepancy is not None and self.asked.discrepancy.is_estimated
+
+
+def is_beside(asked: Asked, problem: Problem) -> bool:
+    """Whether one effect is looked for, beside a discrepancy that was estimated, or of full runs taught.
+
+    A stated one is a bound: within it nothing is looked for.
+    """
+    known = asked.discrepancy
+    return known is not None and (known.is_estimated or (known.is_taught and problem.effort.is_ensemble))
 
 
 def concluded(
@@ -165,18 +179,18 @@ def conclusion_of(
     `validation` are recordings that were held out, `acts` what kind of test they are of.
     """
     problem, groups, notes = inquiry.problem, inquiry.groups, list(notes)
-    is_beside = asked.discrepancy is not None and asked.discrepancy.is_estimated
-    tried = fit_single_effect(inquiry, base) if is_beside else explained(inquiry, base)
-    explanation, verdict, effects, validation = _findings(asked, inquiry, tried, validation, is_beside=is_beside)
+    beside = is_beside(asked, problem)
+    tried = fit_single_effect(inquiry, base) if beside else explained(inquiry, base)
+    explanation, verdict, effects, validation = _findings(asked, inquiry, tried, validation, beside=beside)
     effects = clear_of_null(problem, explanation, effects) if asked.estimates else effects
     # beside a discrepancy what is met is no more than that and noise: what is surely predicted all the same is more
-    is_open = asked.estimates and verdict == "unexplained" and not is_beside
+    is_open = asked.estimates and verdict == "unexplained" and not beside
     if is_open and is_noise_alone(problem, explanation, groups):
         verdict = "no-mismatch"
         notes.append(AS_NOISE)
-    enough = is_tolerated if is_beside else partial(is_enough, mismatch=explanation.after)
+    enough = is_tolerated if beside else partial(is_enough, mismatch=explanation.after)
     remains = not enough(problem, explanation.fitted)
-    grade, effects = graded(*with_shares(problem, explanation, effects, groups), is_beside=is_beside, remains=remains)
+    grade, effects = graded(*with_shares(problem, explanation, effects, groups), is_beside=beside, remains=remains)
     slight = effects if asked.estimates and grade == "immaterial" else ()
     if asked.estimates and (slight or (effects and grade == "unexplained")):
         verdict, effects, explanation = "no-mismatch" if slight else "unexplained", (), explanation.refused()
@@ -207,7 +221,7 @@ def conclusion_of(
 
 
 def _findings(
-    asked: Asked, inquiry: Inquiry, tried: Explanation, validation: Sequence[Dataset], *, is_beside: bool
+    asked: Asked, inquiry: Inquiry, tried: Explanation, validation: Sequence[Dataset], *, beside: bool
 ) -> tuple[Explanation, Verdict, tuple[Named, ...], list[Dataset]]:
     """What is named of an explanation: its verdict, the effects with their numbers, and the recordings for validation.
 
@@ -215,12 +229,13 @@ def _findings(
     from the noise model before any was named.
     """
     problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
-    alike = partial(alike_beside, problem, groups=groups) if is_beside else None
+    is_taught = asked.discrepancy is not None and asked.discrepancy.is_taught
+    alike = partial(alike_beside, problem, groups=groups) if beside else None
 
     def decide(found: Explanation) -> tuple[Explanation, Verdict]:
         return (
-            verdict_on_single_effect(problem, found, groups)
-            if is_beside
+            verdict_on_single_effect(problem, found, groups, is_taught=is_taught)
+            if beside
             else verdict_on(problem, found, groups, phases)
         )
 

@@ -20,6 +20,7 @@ from rollover.spec.document import dump
 FORMAT = "rollover-diagnosis/1"
 JSON, SCENARIO, PAGE, PICTURE = "diagnosis.json", "scenario-diagnosed.yaml", "report.html", "diagnosis.rrd"
 DRAWS = "posterior.csv"
+REFERENCE = "reference"  # what the names of references begin with
 FILES = (JSON, SCENARIO, PAGE, PICTURE, DRAWS)
 
 

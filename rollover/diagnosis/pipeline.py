@@ -22,9 +22,10 @@ from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.time_shift import clock_outliers, estimate_time_shifts, is_explained_by_clocks
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference.discrepancy import Discrepancy, estimated, learned_from_references, with_discrepancy
+from rollover.diagnosis.inference.taught_course import taught_by
 from rollover.diagnosis.inference.wrong_condition import wrong_conditions
 from rollover.diagnosis.invariants import checked
-from rollover.diagnosis.io import json_of, recordings_in
+from rollover.diagnosis.io import REFERENCE, json_of, recordings_in
 from rollover.diagnosis.late_clocks import with_clock_finding
 from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.reported import reported
@@ -38,10 +39,11 @@ from rollover.recording.attitude import continuous
 from rollover.scenario import Scenario, load
 from rollover.spec.vehicle import Striker
 
+COMMON = "what {} references have in common was taken off each channel, as far as each of them repeats the others"
 HALF = SETTINGS.report.grades.half_share
 WITHIN_TOLERANCE = (
-    "the tolerance alone lets these curves pass; it is the most that a scenario may miss them by, and what is named"
-    " surely predicts half of the mismatch on conditions held out"
+    "the tolerance is the most that a scenario may miss the curves by: beside an error of its size nothing is named;"
+    " what is named surely predicts half of the mismatch on conditions held out"
 )
 
 
@@ -61,12 +63,13 @@ def diagnose(
 
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
     out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss
-    it, of all or by channel: what is smaller is none. Where it passes by chance alone or curves are poor, it bounds a
-    discrepancy that is estimated, and what surely predicts half of the mismatch is named (of drops). `reference` names
-    recordings of the same rig in which nothing is suspected: they teach how far it misses, and are not diagnosed. With
-    `estimate` that is estimated where nothing explains the recordings (see `inference.discrepancy`), and the answer
-    beside it is given where it says more: if it is "unexplained" in place of that verdict alone, where neither of the
-    others is stated; if it is True what the estimate makes doubtful is not named either.
+    it, of all or by channel: what is smaller is none. Where nothing explains what is larger, it passes by chance alone
+    or curves are poor, that bounds a discrepancy that is estimated, and what surely predicts half of the mismatch is
+    named (of drops). `reference` names recordings of the same rig in which nothing is suspected: they teach how far it
+    misses, and are not diagnosed. With `estimate` that is estimated where nothing explains the recordings (see
+    `inference.discrepancy`), and the answer beside it is given where it says more: if it is "unexplained" in place of
+    that verdict alone, where neither of the others is stated; if it is True what the estimate makes doubtful is not
+    named either.
     `posterior` draws of the numbers of what is named are made, of drops only.
     `executor` works off the fits, in children if it has any; the answer is the same. Raises `InputError` for an
     unknown condition, a clock that nothing tells the zero of, and recordings without any channel that is simulated;
@@ -100,6 +103,7 @@ def diagnose(
     if reference:
         every, learned = _learned_from_references(scenario, every, reference)
         asked = replace(asked, discrepancy=learned)
+        notes += [COMMON.format(learned.taught_by)] if learned is not None and learned.taught_by else []
     if stated:
         asked = replace(asked, discrepancy=Discrepancy(scales=stated))
     if asked.discrepancy is not None:
@@ -124,7 +128,8 @@ def diagnose(
         if found.verdict == "unexplained" and unexplained is not None:
             found = _second_opinion(unexplained, usable, notes) or found
     bounds = stated or (dict.fromkeys(channels, general) if general > 0.0 else {})
-    if estimate and not reference and bounds and is_hardly_tolerated(found):
+    is_open = found.verdict == "unexplained" or is_hardly_tolerated(found)
+    if estimate and not reference and bounds and is_open and not unfit(scenario):
         used = {e.name for e in usable}
         exact = without_inconsistent([e for e in exact if e.name in used], inconsistent)
         found = _within_tolerance(replace(asked, bounds=bounds), exact, [*inconsistent, *wrong], notes) or found
@@ -198,7 +203,7 @@ def _beside_estimated_discrepancy(
 ) -> Diagnosis | None:
     """The diagnosis beside a discrepancy as large as what explanations leave says; None if it says no more."""
     asked, tried = found.asked, found.tried
-    if asked.discrepancy is not None or found.acts != "drop":
+    if asked.discrepancy is not None:
         return None
     several = [tried.fitted] if len(tried.fitted.candidates) > 1 else []
     learned = estimated(found.problem, tried.base, [*_rivals(tried), *several]).at_most(asked.bounds)
@@ -225,8 +230,8 @@ def _beside_estimated_discrepancy(
 def _is_reproduced(found: Conclusion) -> bool:
     """Whether what nothing explains carries over to recordings that were held out, by its course or by a law."""
     problem, scenario = found.problem, found.asked.scenario
-    if scenario is None:
-        return False
+    if scenario is None or found.acts != "drop":
+        return False  # nothing predicts the course of an overturn but a run
     if repeats_its_course(problem, found.explanation.base, found.groups):
         return True
     scenarios = [set_up(scenario, e.recording) for e in problem.dataset]
@@ -241,15 +246,27 @@ def _rivals(tried: Explanation) -> tuple[Fitted, ...]:
 def _learned_from_references(
     scenario: Scenario, every: Sequence[Dataset], reference: Sequence[str]
 ) -> tuple[list[Dataset], Discrepancy | None]:
-    """The recordings that are no references, and what these teach of the discrepancy; None if noise hides it."""
+    """The recordings that are no references, without what these have in common, and what else these miss.
+
+    None where noise hides that.
+    """
+    others = [e for e in every if e.name not in reference]
     usable = [e for e in every if e.name in reference]
-    learned = None
-    if usable:
-        problem = Problem(weighted_datasets(scenario, usable))
-        estimate_time_shifts(problem)
-        base = problem.fit((), ())
-        learned = None if base is None else learned_from_references(problem, base)
-    return [e for e in every if e.name not in reference], learned
+    if not usable:
+        return others, None
+    problem = Problem(weighted_datasets(scenario, usable))
+    estimate_time_shifts(problem)
+    base = problem.fit((), ())
+    if base is None:
+        return others, None
+    taught = taught_by(problem, base)
+    if taught is None:
+        return others, learned_from_references(problem, base)
+    common, rest = taught
+    learned = learned_from_references(rest, rest.again(base))
+    if learned is not None:
+        learned = replace(learned, taught_by=common.count)
+    return [common.without(e) for e in others], learned
 
 
 def _with_clocks_corrected(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]) -> Diagnosis | None:
@@ -273,7 +290,12 @@ def _with_clocks_corrected(found: Conclusion, every: Sequence[Dataset], notes: S
 
 
 def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
-    """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says."""
+    """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says.
+
+    Those whose names begin with "reference" are references, see `diagnose`.
+    """
     del out
+    recordings = recordings_in(folder)
+    taught = [name for name, _ in recordings if name.startswith(REFERENCE)]
     with Executor(workers) as executor:
-        return json_of(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), executor=executor))
+        return json_of(diagnose(load(folder / "scenario.yaml"), recordings, reference=taught, executor=executor))

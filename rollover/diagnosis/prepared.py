@@ -6,16 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rollover.diagnosis.data.dataset import Dataset, dataset_of, no_common_channel, with_uncertain_conditions
+from rollover.diagnosis.data.dataset import Dataset, dataset_of, with_uncertain_conditions
 from rollover.diagnosis.data.quantisation import with_quantisation, without_spikes
 from rollover.diagnosis.data.repeatability import with_scatter
+from rollover.diagnosis.data.stretches import parted
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import compared
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.forward.full_run import full_runs
-from rollover.diagnosis.forward.interface import first_impact_of
+from rollover.diagnosis.forward.interface import Simulator, first_impact_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.ensemble import with_sample_weights
 from rollover.diagnosis.noise.heteroscedasticity import with_variance_model
@@ -24,7 +25,7 @@ from rollover.diagnosis.noise.truncation import shortened
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 from rollover.spec.channels import describe
-from rollover.system.errors import InputError
+from rollover.system.errors import Fault, InputError
 
 
 def prepared(
@@ -48,7 +49,7 @@ def prepared(
         notes += [f"{name}: {channel} is constant and was excluded" for channel in still]
         if one is None:
             notes.append(f"{name}: shares no usable channel with the simulation and was excluded")
-            foreign += no_common_channel(simulator, name, recording)
+            foreign += _no_common_channel(simulator, name, recording)
         else:
             found.append(one)
             read.append(recording)
@@ -65,6 +66,15 @@ def prepared(
     return found, notes
 
 
+def _no_common_channel(simulator: Simulator, name: str, recording: Recording) -> list[Fault]:
+    """That nothing that was recorded is simulated, where that is so."""
+    made = simulator.predict({}, 0.0)
+    if made is None or made.keys() & recording.channels.keys():
+        return []
+    message = f"no channel that this scenario simulates, got {', '.join(recording.channels)}; one of them at least"
+    return [Fault(file=name, message=message)]
+
+
 def with_common_noise(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:
     """The recordings with the noise of those alike taken together, from their quiet stretches."""
     every = [with_uncertain_conditions(e, set_up(scenario, e.recording)) for e in with_scatter(every)]
@@ -79,5 +89,6 @@ def with_common_noise(scenario: Scenario, every: Sequence[Dataset]) -> list[Data
 
 def weighted_datasets(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:
     """The recordings weighed, what the simulation itself is not sure of less."""
-    reweighted = [with_sample_weights(e, e.simulator.perturbed()) for e in with_common_noise(scenario, every)]
+    alike = [autoregression.with_own_model_error(parted(e)) for e in with_common_noise(scenario, every)]
+    reweighted = [with_sample_weights(e, e.simulator.perturbed()) for e in alike]
     return [shortened(e, alone=len(reweighted) == 1) for e in reweighted]

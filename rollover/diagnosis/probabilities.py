@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.data.stretches import channel_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.inference.discrepancy import MEDIAN, SCALES, SPREAD, residual_rms
@@ -116,7 +117,8 @@ def credible(problem: Problem, fits: Sequence[Fitted]) -> list[Fitted]:
 
 def resolution(problem: Problem, channel: str) -> float:
     """Least rms of a channel, share of its range, that is told from noise: by the standard error of that's power."""
-    those = [s for e in problem.dataset for s in e.signals if s.channel == channel]
+    every = [s for e in problem.dataset for s in e.signals if s.channel == channel_of(channel)]
+    those = [s for s in every if s.key == channel] or every
     power = float(np.mean([(s.noise / s.span) ** 2 for s in those]))
     return float(np.sqrt(power * np.sqrt(2.0 / sum(s.rows.size for s in those))))
 

@@ -55,6 +55,7 @@ def reported(c: Conclusion) -> Diagnosis:
         law = proposed(problem, explanation.base, set_ups, found, groups)
     model_error = {} if asked.discrepancy is None else asked.discrepancy.scales_by_channel(found)
     shares = {} if asked.discrepancy is None else {k: asked.discrepancy.scales[k] for k in model_error}
+    is_taught = asked.discrepancy is not None and asked.discrepancy.is_taught
     detectable = dict(explanation.detectable)
     contrary = inconsistent_repeats(found, SETTINGS.data.repeatability.contradiction)
     if verdict == "no-mismatch" and not c.slight and (contrary or is_underpowered(detectable)):
@@ -79,9 +80,9 @@ def reported(c: Conclusion) -> Diagnosis:
     if is_left:
         said += clock_offset_sentence(clock_outliers(problem, explanation.fitted, asked.executor.parallel_map))
     if recording_fault is None:
-        said += by_share(effects, shares, estimated=c.is_beside)
+        said += by_share(effects, shares, estimated=c.is_estimated)
     said += offered(law) + inconsistency_sentences(c.inconsistencies) + contradiction_clause(verdict, contrary)
-    said += tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found)
+    said += tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found, taught=is_taught)
     said += no_contact_clause(found)
     return Diagnosis(
         verdict=verdict,
@@ -149,7 +150,9 @@ def _main_sentence(
     if c.slight:
         return immaterial_sentence(c.slight)
     if verdict == "no-mismatch" and discrepancy is not None and c.is_beside:
-        return usual_model_error_sentence(discrepancy.scales, explanation.p_value, len(found), _most(c))
+        return usual_model_error_sentence(
+            discrepancy.scales, explanation.p_value, len(found), _most(c), taught=discrepancy.is_taught
+        )
     return sentence(
         verdict,
         c.effects,

@@ -132,7 +132,10 @@ def immaterial_sentence(effects: Sequence[Named]) -> str:
 
 
 def background(shares: Mapping[str, float]) -> str:
-    """A discrepancy in words: its shares of the channels' ranges."""
+    """A discrepancy in words: its shares of the channels' ranges, of many the least and the most."""
+    if len(shares) > TUNING.spelt_out_scales:
+        least, most = (one(shares, key=lambda k: shares[k]) for one in (min, max))
+        return f"{shares[least]:.1%} of {least} to {shares[most]:.1%} of {most}"
     return ", ".join(f"{share:.1%} of {channel}" for channel, share in shares.items())
 
 
@@ -155,7 +158,12 @@ def by_share(effects: Sequence[Named], scales: Mapping[str, float], *, estimated
 
 
 def usual_model_error_sentence(
-    scales: Mapping[str, float], p_value: float, recordings: int, best: tuple[Candidate, Share] | None = None
+    scales: Mapping[str, float],
+    p_value: float,
+    recordings: int,
+    best: tuple[Candidate, Share] | None = None,
+    *,
+    taught: bool = False,
 ) -> str:
     """The sentence where all is met but for an estimated background, a share of each channel's range.
 
@@ -168,10 +176,12 @@ def usual_model_error_sentence(
         some = (
             f" Part of it is predicted by {candidate.id}{of}: {found.share:.0%} ({found.low:.0%} to {found.high:.0%})."
         )
+    how, most = ("a taught", "the references miss") if taught else ("an estimated", "models usually miss")
+    least = "surely predicts some" if taught else "predicts half"
     return (
-        f"Simulation and {recordings} recordings agree but for an estimated background (1 sigma, of the range: "
-        f"{background(scales)}): more than noise (p = {p_value:.2g}), no more than models usually miss, and no effect "
-        f"that could be named predicts half of it on recordings that were held out.{some}"
+        f"Simulation and {recordings} recordings agree but for {how} background (1 sigma, of the range: "
+        f"{background(scales)}): more than noise (p = {p_value:.2g}), no more than {most}, and no effect "
+        f"that could be named {least} of it on recordings that were held out.{some}"
     )
 
 
@@ -271,10 +281,12 @@ def is_hardly_tolerated(found: Diagnosis) -> bool:
     return score.nrmse > 1.0 or (score.iso18571 is not None and grade(score.iso18571) == "poor")
 
 
-def tolerance_clause(verdict: Verdict, p_value: float, score: Score | None, dataset: Sequence[Dataset]) -> str:
+def tolerance_clause(
+    verdict: Verdict, p_value: float, score: Score | None, dataset: Sequence[Dataset], *, taught: bool = False
+) -> str:
     """What a sentence goes on with where a stated tolerance lets pass poor curves, or a peak force that is off by more.
 
-    Poor is what ISO/TS 18571 calls so.
+    Poor is what ISO/TS 18571 calls so. `taught` says that references told what is tolerated.
     """
     is_beyond_noise = verdict == "no-mismatch" and p_value < SETTINGS.inference.lack_of_fit.p_value
     if not is_beyond_noise or score is None:
@@ -289,10 +301,12 @@ def tolerance_clause(verdict: Verdict, p_value: float, score: Score | None, data
         said = f"A peak force is off by {abs(peak):.0%}"
     else:
         return ""
-    return (
-        f" {said}: what is tolerated may hide an effect; a smaller --tolerance,"
-        " or values known better than their stated uncertainty, may show it."
+    cure = (
+        "a model that meets the references better, or more of them,"
+        if taught
+        else "a smaller --tolerance, or values known better than their stated uncertainty,"
     )
+    return f" {said}: what is tolerated may hide an effect; {cure} may show it."
 
 
 def sentence(

@@ -45,6 +45,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = body.inertia.mass * np.eye(3)
         mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = body.tensor
     points, owner, members_f, members_i = _point_rows(bodies, uneven=not is_flat(ground.surface))
+    blocks = np.concatenate([_blocks(p[0]) for p in points] or [np.zeros((0, 6))])
     wheels = () if isinstance(vehicle, Striker) else vehicle.wheels
     wheel_f = wheel_rows(wheels, bodies, row)
     spin_i, spin_f, drive = turning_rows(scenario, wheel_f, 6 * nb)
@@ -91,7 +92,10 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         point_body=owner,
         member_f=np.array(members_f).reshape(-1, 9),
         member_i=np.array(members_i, dtype=np.int64).reshape(-1, 5),
-        block_f=np.concatenate([_blocks(p[0]) for p in points] or [np.zeros((0, 6))]),
+        block_f=blocks,
+        block_wake=np.zeros(len(blocks)),
+        member_wake=np.zeros(len(members_f)),
+        approach=_approach(nb, members_f, members_i),
         wheel_f=wheel_f,
         wheel_i=wheel_i,
         spin_i=spin_i,
@@ -205,6 +209,15 @@ def _blocks(place: Array) -> Array:
     first = np.arange(0, len(place), c.BLOCK)
     low, high = np.minimum.reduceat(place, first), np.maximum.reduceat(place, first)
     return np.hstack([0.5 * (low + high), 0.5 * (high - low) + SLACK])
+
+
+def _approach(nb: int, members_f: list[list[float]], members_i: list[tuple[int, ...]]) -> Array:
+    """Rows of `approach` before any search: how far the corners of a body's boxes are from its centre of mass."""
+    approach = np.zeros((nb, c.APPROACH_COLUMNS))
+    for box, (body, *_) in zip(members_f, members_i, strict=True):
+        far = float(np.linalg.norm(np.abs(box[:3]) + box[3:6]))
+        approach[body, c.L_FAR] = max(approach[body, c.L_FAR], far)
+    return approach
 
 
 def _box(surface: SurfacePoints, centre: Array) -> list[float]:

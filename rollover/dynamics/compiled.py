@@ -39,8 +39,8 @@ def course_of(recorder: Recorder, steps: int) -> scheme.Course:
 
 def solve(recorder: Recorder, steps: int) -> str:
     """Run the time loop; returns "" or why it gave up. Raises ``DivergedError``."""
-    course, watch, live = course_of(recorder, steps), recorder.past.watch, recorder.live
-    reason = loop.begin(live.handle, course, watch)
+    course, watch, live = course_of(recorder, steps), recorder.watch, recorder.live
+    reason = loop.begin(live.handle, course, watch, recorder.past.watch.drive, recorder.past.start)
     while True:
         time = float(course.real[scheme.TIME])
         recorder.see_to(reason, time, course.qd)

@@ -54,6 +54,19 @@ def _cross(a: Array, b: Array) -> Array:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
+def _root(f: Callable[[float], float], low: float, high: float) -> float:
+    """Where f changes its sign, to 1e-4.
+
+    brentq's own wrapper refers to itself: what it is handed, here with a run's tables, would stay until garbage is
+    collected.
+    """
+    held = [f]
+    try:
+        return float(brentq(lambda x: held[0](x), low, high, xtol=1e-4))
+    finally:
+        held.clear()
+
+
 class Equilibrium:
     """Few coordinates u: height, roll, pitch, axle angle, slide (2), yaw; shift (3) and tilt (3) of each sprung body.
 
@@ -104,7 +117,7 @@ class Equilibrium:
             return float(d[front].max() - d[~front].max())
 
         if front.any() and not front.all() and uneven(-0.4) * uneven(0.4) < 0.0:
-            deepest = float(depths(brentq(uneven, -0.4, 0.4, xtol=1e-4)).max())
+            deepest = float(depths(_root(uneven, -0.4, 0.4)).max())
         else:
             deepest = float(depths(0.0).max())
         u[0] += deepest - self.scale / float(self.t.wheel_f[:, W_KZ].sum())

@@ -78,21 +78,33 @@ class Recorder:
     progress: Callable[[float, float], None] | None
     began: float  # wall time
     force: Any  # (n,) generalised forces
+    watch: loop.WatchHandle = field(init=False)
     events: list[Event] = field(default_factory=list)
     last: float = 0.0  # of the solver's time
     due: float = 0.0  # wall time of the next word of progress
 
+    def __post_init__(self) -> None:
+        """Hand the kernels what they watch."""
+        self.watch = loop.watched(self.past.watch)
+
     def after_step(self, time: float, q: Any, qd: Any, qdd: Any) -> bool:
         """End an accepted step of a solver that makes them one by one, or the start; False ends the run."""
-        live, watch = self.live, self.past.watch
+        live, watch = self.live, self.watch
         now = self.now(time)
         dt = time - self.last  # the solver halves a step that does not converge
         self.last = time
         live.tables.clock[1] = now
         end_of_step(live.handle, q, qd, qdd, dt, self.force, False)
-        throttle(live.handle, watch.drive, now)
+        if self.past.watch.drive.size:
+            throttle(live.handle, self.past.watch.drive, now)
+        if self.control is None:
+            reason = loop.look(live.handle, watch, q, qd, qdd, self.force, dt, time)
+            if reason == 0:
+                return True
+            self.see_to(reason, time, qd)
+            return self.goes_on(reason, time, q)
         self.see_to(loop.check(live.handle, watch, qd, self.force), time, qd)
-        goes_on = self.control is None or self.control.after(now, dt, q, qd, live.tables)
+        goes_on = self.control.after(now, dt, q, qd, live.tables)
         live.tables.velocity[:] = qd  # a blow of the control has changed it
         return self.goes_on(loop.keep(live.handle, watch, q, qd, qdd, dt, time), time, q) and goes_on
 

@@ -17,10 +17,11 @@ from ground.kernel import (
     rut_depth,
 )
 from ground.relief import element_plane, height_and_gradient, highest
-from rollover.kernels.tables import BLOCK, MEMORYLESS, OMEGA, OUTSIDE, ROT, SLOTS
+from rollover.kernels.tables import BLOCK, L_BASE, L_DOWN, L_FAR, L_WAY, MEMORYLESS, OMEGA, OUTSIDE, ROT, SLOTS
 from rollover.kernels.vectors import depth_acceleration, place, to_body, velocity
 
 AHEAD = 2.0  # steps that a point may be away from memoryless ground: the next may be twice as long, and faster
+GUARD = 1e-9  # m: far beyond the rounding of what a body's points have sunk by, so that none is passed over too long
 FOUND = 1e-300  # m: depth that marks as found what is not yet in the ground
 
 
@@ -58,29 +59,53 @@ def gather(t: Any, candidates: int, count: int) -> None:
 
 
 @leaf
+def follow(t: Any) -> None:
+    """Add to each body's `L_WAY` what any of its points may have sunk by since the last search.
+
+    depth(r) = base - down . r, so that it grows by |base' - base| + |down' - down| |r| at most.
+    """
+    n, offset = t.plane[:3], t.plane[3]
+    for b in range(t.pose.shape[0]):
+        row, s = t.pose[b], t.approach[b]
+        d0, d1, d2 = to_body(row, n[0], n[1], n[2])
+        base = offset - n[0] * row[0] - n[1] * row[1] - n[2] * row[2]
+        e0, e1, e2 = d0 - s[L_DOWN], d1 - s[L_DOWN + 1], d2 - s[L_DOWN + 2]
+        s[L_WAY] += abs(base - s[L_BASE]) + s[L_FAR] * math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
+        s[L_BASE], s[L_DOWN], s[L_DOWN + 1], s[L_DOWN + 2] = base, d0, d1, d2
+
+
+@leaf
 def on_plane(t: Any) -> Any:
     """Points below a flat surface, as candidates; returns how many, and of how many elements."""
     n, offset = t.plane[:3], t.plane[3]
     candidates, count = 0, 0
+    follow(t)
     for member in range(t.member_i.shape[0]):
-        row = t.pose[t.member_i[member, 0]]
-        m = t.member_f[member]
-        down = to_body(row, n[0], n[1], n[2])
+        m, row, s = t.member_f[member], t.pose[t.member_i[member, 0]], t.approach[t.member_i[member, 0]]
+        way, base, down = s[L_WAY], s[L_BASE], s[L_DOWN:]
+        near = nearing(t, row, m)
+        if way + near < t.member_wake[member]:
+            continue
         if down[0] * m[6] + down[1] * m[7] + down[2] * m[8] > -1e-6 and m[6] * m[6] + m[7] * m[7] + m[8] * m[8] > 0.0:
             continue  # a flat patch that does not face the ground
         x, y, z = place(row, m[0], m[1], m[2])
         reach = abs(down[0]) * m[3] + abs(down[1]) * m[4] + abs(down[2]) * m[5]
-        near = nearing(t, row, m)
         if n[0] * x + n[1] * y + n[2] * z - offset > reach + near:
             continue
-        base = offset - n[0] * row[0] - n[1] * row[1] - n[2] * row[2]
         facing = -(down[0] * m[6] + down[1] * m[7] + down[2] * m[8])
         is_flat = m[6] * m[6] + m[7] * m[7] + m[8] * m[8] > 0.0
-        d0, d1, d2 = down
-        first, end = t.member_i[member, 1], t.member_i[member, 2]
+        d0, d1, d2 = down[0], down[1], down[2]
+        first, end, soonest = t.member_i[member, 1], t.member_i[member, 2], math.inf
         for block in range(-(-(end - first) // BLOCK)):
-            at = first + block * BLOCK
-            if is_clear(t.block_f[t.member_i[member, 4] + block], down, base, near):
+            at, k = first + block * BLOCK, t.member_i[member, 4] + block
+            if way + near >= t.block_wake[k]:
+                deepest = depth_of(t.block_f[k], down, base)
+                t.block_wake[k] = way - deepest - GUARD
+                is_clear = deepest <= -near
+            else:
+                is_clear = True
+            soonest = min(soonest, t.block_wake[k])
+            if is_clear:
                 continue
             for i in range(at, min(at + BLOCK, end)):
                 a, b, c = t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2]
@@ -109,14 +134,15 @@ def on_plane(t: Any) -> Any:
                     continue
                 count += note_candidate(t, candidates, count, slot, i, facing, depth)
                 candidates += 1
+        t.member_wake[member] = soonest
     return candidates, count
 
 
 @inlined
-def is_clear(box: Any, down: Any, base: float, near: float) -> bool:
-    """Whether no point of a box is near the ground: none of them would be looked at further."""
+def depth_of(box: Any, down: Any, base: float) -> float:
+    """Depth of the lowest corner of a box, m: none of its points lies deeper."""
     reach = abs(down[0]) * box[3] + abs(down[1]) * box[4] + abs(down[2]) * box[5]
-    return base - (down[0] * box[0] + down[1] * box[1] + down[2] * box[2]) + reach <= -near  # type: ignore[no-any-return]
+    return base - (down[0] * box[0] + down[1] * box[1] + down[2] * box[2]) + reach  # type: ignore[no-any-return]
 
 
 @leaf

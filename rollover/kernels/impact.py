@@ -177,17 +177,20 @@ def share_mass(t: Any, new: Any, total: int, share: Any) -> None:
             t.memory[i, MASS_B] = max(min(fraction * part, fraction - taken), 0.0) / W[a]
         add_outer(N, t.memory[i, MASS_B], J[a], 6 * t.state[i, BODY])
     if fraction > 0.0:
-        before = largest_eigenvalue(A, P)
+        alone = True  # nothing moves along yet
         for i in range(n):
             for m in range(n):
+                alone = alone and P[i, m] == 0.0
                 N[i, m] += P[i, m]
         after = largest_eigenvalue(A, N)
         factor = 1.0
-        if before == 0.0 and after > 0.0:
+        if alone and after > 0.0:
             factor = fraction / after  # a set of its own takes its whole fraction in the direction that feels it most
-        elif after > fraction * (1.0 + 1e-9) and after > before:
-            # the largest eigenvalue is convex in the factor: the chord never overshoots
-            factor = max(min((fraction - before) / (after - before), 1.0), 0.0)
+        elif after > fraction * (1.0 + 1e-9):
+            before = largest_eigenvalue(A, P)
+            if after > before:
+                # the largest eigenvalue is convex in the factor: the chord never overshoots
+                factor = max(min((fraction - before) / (after - before), 1.0), 0.0)
         for k in range(total):
             t.memory[t.active[new[k]], MASS_B] *= factor
 

@@ -76,10 +76,10 @@ def add_block(K: Any, factor: float, a: Any, at: int, b: Any, bt: int) -> None:
             K[at + j, bt + k] += factor * a[j] * b[k]
 
 
-@compiled
-def add_point(K: Any, row: Any, b: int, r: Any, n: Any, normal: float, tangential: float) -> None:
-    """A spring `normal` along n and `tangential` across it at the point r of body b."""
-    J, d = np.empty(6), np.zeros(3)
+@leaf
+def add_point(K: Any, row: Any, b: int, r: Any, n: Any, normal: float, tangential: float, room: Any) -> None:
+    """A spring `normal` along n and `tangential` across it at the point r of body b; `room` (ROOM, 6) is written."""
+    J, d = room[0], room[1]
     direction_row(row, r, n[0], n[1], n[2], J)
     add_block(K, normal - tangential, J, 6 * b, J, 6 * b)
     if tangential > 0.0:
@@ -87,17 +87,22 @@ def add_point(K: Any, row: Any, b: int, r: Any, n: Any, normal: float, tangentia
             d[0], d[1], d[2] = 0.0, 0.0, 0.0
             d[k] = 1.0
             direction_row(row, r, d[0], d[1], d[2], J)
-            add_block(K, tangential, J, 6 * b, J, 6 * b)
+            for j in range(6):
+                if J[j] != 0.0:  # of the first three one alone is not
+                    for i in range(6):
+                        K[6 * b + j, 6 * b + i] += tangential * J[j] * J[i]
 
 
-@compiled
-def add_tangent(K: Any, row: Any, b: int, m: Any, trial: Any, soil: Any, normal: float, along: float) -> None:
+@leaf
+def add_tangent(
+    K: Any, row: Any, b: int, m: Any, trial: Any, soil: Any, normal: float, along: float, room: Any
+) -> None:
     """The whole derivative of a contact's normal force and friction, which is not symmetric where it slips.
 
     With x the strain of the stick spring and u = x/max(|x|, d_s): F_t = -mu F_n u, so that F_n brings -mu u dF_n, and
     u turns with dx across x only where |x| > d_s.
     """
-    n, D, C, x, v = m[NORMAL : NORMAL + 3], np.empty((3, 6)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    n, D, C, x, v = m[NORMAL : NORMAL + 3], room[0:3], room[3:6], room[6], room[7]
     v[0], v[1], v[2] = velocity(row, m[OWNER_R], m[OWNER_R + 1], m[OWNER_R + 2])
     lean = 0.0
     for k in range(3):
@@ -131,12 +136,12 @@ def add_pair(K: Any, factor: float, a: Any, at: int, b: Any, bt: int) -> None:
     add_block(K, -factor, b, bt, a, at)
 
 
-@compiled
-def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
-    """K (6 nb, 6 nb) = f (-dQ/dq) + fd (-dQ/dq') at the state that was tried last."""
-    for i in range(K.shape[0]):
-        for k in range(K.shape[1]):
-            K[i, k] = 0.0
+ROOM = 8  # rows of 6 numbers that a leaf works with: one that made arrays of its own would count who holds them
+
+
+@leaf
+def add_elements(t: Any, f: float, fd: float, K: Any, room: Any) -> None:
+    """Contacts with elements of the ground."""
     for a in range(t.counts[ACTIVE]):
         i = t.active[a]
         m, trial = t.memory[i], t.trial[i]
@@ -159,7 +164,7 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
             normal = area * (f * (deeper - here) + fd * (faster - here)) * 1e6
         b = t.state[i, BODY]
         if soil[MEMORYLESS] > 0.0:
-            add_tangent(K, t.pose[b], b, m, trial, soil, normal, f + fd * soil[RELAXATION])
+            add_tangent(K, t.pose[b], b, m, trial, soil, normal, f + fd * soil[RELAXATION], room)
             continue
         if soil[MODULUS] > 0.0:
             stick = (soil[COHESION] * m[AREA] + soil[MU] * trial[FN] + m[PLOUGHED]) / soil[MODULUS]
@@ -173,7 +178,13 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
             m[NORMAL : NORMAL + 3],
             normal,
             stick * (f + fd * soil[RELAXATION]),
+            room,
         )
+
+
+@leaf
+def add_wheels(t: Any, f: float, fd: float, K: Any, room: Any) -> None:
+    """Tyres on the ground."""
     for w in range(t.wheel_i.size):
         g, c = t.wheel_memory[w], t.wheel_f[w]
         if g[E_FORCE_NOW] > 0.0:
@@ -182,27 +193,40 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
             bottom = c[W_KB] if g[E_DEPTH_NOW] > c[W_BOTTOM] else 0.0
             normal = f * (k + bottom) + fd * c[W_C] * k / c[W_KZ]
             stick = c[W_KY] * (f + fd * TYRE_RELAXATION) if c[W_MU] > 0.0 else 0.0
-            add_point(K, t.pose[b], b, g[E_POINT : E_POINT + 3], g[E_NORMAL_NOW : E_NORMAL_NOW + 3], normal, stick)
-    add_mounts(t, f, fd, K)
+            n = g[E_NORMAL_NOW : E_NORMAL_NOW + 3]
+            add_point(K, t.pose[b], b, g[E_POINT : E_POINT + 3], n, normal, stick, room)
+
+
+@compiled
+def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
+    """K (6 nb, 6 nb) = f (-dQ/dq) + fd (-dQ/dq') at the state that was tried last."""
+    for i in range(K.shape[0]):
+        for k in range(K.shape[1]):
+            K[i, k] = 0.0
+    room = np.empty((ROOM, 6))
+    add_elements(t, f, fd, K, room)
+    add_wheels(t, f, fd, K, room)
+    add_mounts(t, f, fd, K, room)
     stiffen_terms(t, f, fd, K)
     stiffen_links(t, f, fd, K)
     if t.axle_f.size > 0 and t.axle_memory[M_TORQUE_NOW] != 0.0:
         c, b = t.axle_i[0], t.axle_i[1]
-        add_pair(K, f * t.axle_f[A_K] + fd * t.axle_f[A_C], spin_row(t, c, c, 0), 6 * c, spin_row(t, c, b, 0), 6 * b)
+        spin_row(t, c, c, 0, room[0])
+        spin_row(t, c, b, 0, room[1])
+        add_pair(K, f * t.axle_f[A_K] + fd * t.axle_f[A_C], room[0], 6 * c, room[1], 6 * b)
 
 
-@compiled
-def spin_row(t: Any, c: int, b: int, k: int) -> Any:
-    """Row (6,) of the angular velocity of body b about axis k of body c."""
-    J = np.zeros(6)
+@leaf
+def spin_row(t: Any, c: int, b: int, k: int, J: Any) -> None:
+    """Row (6,) of the angular velocity of body b about axis k of body c, into J."""
+    J[0], J[1], J[2] = 0.0, 0.0, 0.0
     J[3], J[4], J[5] = to_body(t.pose[b], t.pose[c, ROT + k], t.pose[c, ROT + 3 + k], t.pose[c, ROT + 6 + k])
-    return J
 
 
-@compiled
-def add_mounts(t: Any, f: float, fd: float, K: Any) -> None:
+@leaf
+def add_mounts(t: Any, f: float, fd: float, K: Any, room: Any) -> None:
     """Springs of mounts and hinges along and about the axes of body a; none where they move in their play."""
-    J, L, local = np.empty(6), np.empty(6), np.empty(3)
+    J, L, local = room[0], room[1], room[2]
     for i in range(t.mount_f.shape[0]):
         g, m = t.mount_f[i], t.mount_memory[i]
         c, b = t.mount_i[i, 0], t.mount_i[i, 1]
@@ -217,7 +241,9 @@ def add_mounts(t: Any, f: float, fd: float, K: Any) -> None:
                 add_pair(K, f * g[T_K + k] + fd * g[T_C + k], J, 6 * b, L, 6 * c)
             if not loose(g, m, 3 + k):
                 factor = f * g[T_K + 3 + k] + fd * g[T_C + 3 + k]
-                add_pair(K, factor, spin_row(t, c, b, k), 6 * b, spin_row(t, c, c, k), 6 * c)
+                spin_row(t, c, b, k, J)
+                spin_row(t, c, c, k, L)
+                add_pair(K, factor, J, 6 * b, L, 6 * c)
 
 
 @leaf

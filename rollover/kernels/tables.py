@@ -51,6 +51,10 @@ S_SET, S_FLOWED, S_DELTA, S_FORCE, S_SET_NOW, S_FLOWED_NOW, S_DELTA_NOW, S_FORCE
 BLOCK = 32  # points that one box stands for; looking at it costs as much as looking at two of them
 SET_COLUMNS = 48
 
+# columns of approach: bound of what any point of a body has sunk by since the first search, distance of its boxes from
+# its centre of mass; depth of its centre below the plane and the plane's normal in its axes at the last search
+L_WAY, L_FAR, L_BASE, L_DOWN, APPROACH_COLUMNS = 0, 1, 2, 3, 6
+
 # columns of axle_f and axle_memory
 A_SWING, A_K, A_C, A_IMPACT, A_RESTITUTION, AXLE_COLUMNS = 0, 1, 2, 3, 4, 5
 # angle and torque at the start of the step and now; whether the next touch of a stop is an impact, the angle at which
@@ -118,6 +122,9 @@ class Tables(NamedTuple):
     member_f: Any  # (nm, 9) centre and half size of a box around a patch's points, normal of a flat patch or 0
     member_i: Any  # (nm, 5) body, first point, end, next member if the box is nowhere near the ground, first block
     block_f: Any  # (nk, 6) centre and half size of a box around `BLOCK` points of a patch that follow each other
+    block_wake: Any  # (nk,) of a body's L_WAY at which a point of the block may be in the ground
+    member_wake: Any  # (nm,) the least of a member's blocks
+    approach: Any  # (nb, APPROACH_COLUMNS)
     wheel_f: Any  # (nw, WHEEL_COLUMNS)
     wheel_i: Any  # (nw,) carrier
     spin_i: Any  # (nw,) coordinate of the wheel's angle, or -1: it does not turn by itself
@@ -213,6 +220,9 @@ def handle(t: Any) -> Any:
         t.member_f,
         t.member_i,
         t.block_f,
+        t.block_wake,
+        t.member_wake,
+        t.approach,
         t.wheel_f,
         t.wheel_i,
         t.spin_i,

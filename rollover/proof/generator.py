@@ -60,12 +60,16 @@ class Order:
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """Scenario text and recordings for the diagnosis, and the truth (bare JSON values) that stays here."""
+    """Scenario text and recordings for the diagnosis, and the truth (bare JSON values) that stays here.
+
+    `references` are recordings of the same rig in which nothing is missing but what it misses always.
+    """
 
     name: str
     scenario: str
     recordings: tuple[Recording, ...]
     truth: Mapping[str, Any]
+    references: tuple[Recording, ...] = ()
 
 
 def plan(

@@ -14,11 +14,16 @@ WRITTEN = 946_684_800  # s since 1970: every file of every case was written at t
 
 
 def write_case(case: Case, folder: Path) -> None:
-    """Write `scenario.yaml` and r1, r2, ... (Parquet with a sidecar) into a new folder. Raises `InputError`."""
+    """Write `scenario.yaml` and r1, r2, ... (Parquet with a sidecar) into a new folder. Raises `InputError`.
+
+    References, if any, are reference1, reference2, ...
+    """
     folder.mkdir(parents=True, exist_ok=False)
     (folder / SCENARIO).write_text(case.scenario, encoding="utf-8")
     for number, recording in enumerate(case.recordings, start=1):
         write_recording(recording, folder / f"r{number}.parquet")
+    for number, recording in enumerate(case.references, start=1):
+        write_recording(recording, folder / f"reference{number}.parquet")
     for path in (*folder.iterdir(), folder):
         os.utime(path, (WRITTEN, WRITTEN))
 

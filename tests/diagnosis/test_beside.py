@@ -100,6 +100,23 @@ def test_an_effect_is_named_where_it_predicts_half_else_forgiven(
     assert bool(found.parts) == (verdict == "missing-physics")
 
 
+@pytest.mark.parametrize(
+    ("left", "p_value", "is_named"),
+    [
+        ((0.6, 0.7, 0.8, 0.7, 0.8, 0.6), 1e-9, True),  # a fifth, of each recording
+        ((0.6, 1.0, 1.2, 0.7, 0.6, 0.7), 1e-9, False),  # of some alone: maybe none
+        ((0.6, 0.7, 0.8, 0.7, 0.8, 0.6), 0.01, False),  # the best of all gains as much by chance
+    ],
+)
+def test_beside_what_references_taught_a_sure_part_is_named(
+    left: tuple[float, ...], p_value: float, is_named: bool
+) -> None:
+    one = explanation(SOME, fitted("soil-layer", left), p_value=p_value)
+    assert verdict_on_single_effect(PROBLEM, one, GROUPS)[1] in ("unexplained", "no-mismatch")
+    found, said = verdict_on_single_effect(PROBLEM, one, GROUPS, is_taught=True)
+    assert (bool(found.parts), said == "missing-physics") == (is_named, is_named)
+
+
 def test_a_gain_is_one_draw_however_many_recordings_repeat_it() -> None:
     """Of errors that come anew 240 samples of six drops tell 24, of those that a rig repeats 4."""
     base, best = nothing((2.0,) * DROPS), fitted("soil-layer", (1.0,) * DROPS)
@@ -165,6 +182,14 @@ def test_rivals_akin_or_within_the_discrepancy_are_kept(monkeypatch: pytest.Monk
     # where there is little to explain, one that explains less of it is excluded though it leaves little
     step = explanation(SOME, fitted("soil-layer", (0.2,) * DROPS), fitted("guide-friction", (0.7,) * DROPS)).parts[0]
     assert [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)] == ["soil-layer"]
+
+
+def test_many_scales_are_told_by_the_least_and_the_most() -> None:
+    scales = {f"c{k}": 0.01 * (k + 1) for k in range(9)}
+    said = usual_model_error_sentence(scales, 1e-9, 4, taught=True)
+    assert "a taught background (1 sigma, of the range: 1.0% of c0 to 9.0% of c8)" in said
+    assert "c4" not in said
+    assert "no more than the references miss" in said
 
 
 @pytest.mark.parametrize(("low", "is_told"), [(0.12, True), (-0.05, False)])

@@ -15,7 +15,7 @@ from rollover.diagnosis.selection.explanation import Explanation
 from tests.diagnosis.test_beside import DROPS, explanation, fitted
 
 CHANNELS = ("ground/force_normal", "ground/sinkage", "striker/acceleration_z")
-SIGNALS = [SimpleNamespace(channel=c, noise=0.003, span=1.0, rows=np.arange(400)) for c in CHANNELS]
+SIGNALS = [SimpleNamespace(channel=c, key=c, noise=0.003, span=1.0, rows=np.arange(400)) for c in CHANNELS]
 PROBLEM = cast(Problem, SimpleNamespace(dataset=[SimpleNamespace(signals=SIGNALS)] * DROPS))
 
 

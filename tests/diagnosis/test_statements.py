@@ -211,3 +211,6 @@ def test_a_tolerance_that_lets_poor_curves_pass_is_said(
     assert ("By ISO 18571 they are poor (0.52): what is tolerated may hide an effect" in said) == told
     assert bool(said) == told
     assert statements.tolerance_clause(verdict, p_value, None, dataset) == ""
+    by_references = statements.tolerance_clause(verdict, p_value, score, dataset, taught=True)
+    assert ("a model that meets the references better" in by_references) == told
+    assert "--tolerance" not in by_references

@@ -67,7 +67,7 @@ def test_a_tolerance_does_not_hide_a_spring() -> None:
     assert stiffness.low is not None
     assert stiffness.high is not None
     assert stiffness.low < STIFFNESS < stiffness.high
-    assert any("tolerance alone lets" in note for note in found.notes)
+    assert any("the tolerance is the most" in note for note in found.notes)
 
 
 def test_a_bound_holds_each_scale_that_it_is_stated_for() -> None:

@@ -65,6 +65,26 @@ def test_a_run_that_has_ended_holds_no_tables(integrator: str, monkeypatch: pyte
     assert [there() for there in held] == [None]
 
 
+def test_a_compiled_run_leaves_no_garbage_of_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What waits for a collection of garbage is held twenty times over in a worker of a study."""
+    made = []
+
+    def made_tables(*args: Any) -> Tables:
+        tables = assembly.tables_of(*args)
+        made.append(weakref.ref(tables.event))
+        return tables
+
+    monkeypatch.setattr(setup, "tables_of", made_tables)
+    gc.collect()
+    gc.disable()
+    try:
+        short = {"simulation.integrator": "compiled", "simulation.duration": 0.01}
+        simulate.run(load("side_overturn").replaced(short))
+        assert [there() for there in made] == [None]
+    finally:
+        gc.enable()
+
+
 def test_a_leaf_reads_a_bundle_as_a_counting_kernel_does() -> None:
     """By name, whatever stands before it in the bundle: every array is told by its first numbers."""
     integers = {"law", "state", "counts", "active", "touched", "point_body", "member_i", "slot_of"}

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ground.law import BRANCH, REFERENCE_AREA, evaluate, touched
+from ground.law import BRANCH, HIDDEN, REFERENCE_AREA, evaluate, touched
 from ground.ye import (
     CO_MOVING_FRACTIONS,
     MULTIPLE_CORRELATION,
@@ -158,3 +158,24 @@ def test_where_the_numbers_come_from() -> None:
 def test_the_literal_eq_6_is_a_mode_of_its_own() -> None:
     assert not LAW.unloads_at_rest_stiffness
     assert Ye2006(unloading="rest-stiffness").unloads_at_rest_stiffness
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    share=st.floats(1e-3, 1.2),
+    speed=st.floats(0.1, 3.5),
+    exponent=st.floats(-0.99, -1e-3),
+)
+def test_what_spares_the_power_changes_no_bit(share: float, speed: float, exponent: float) -> None:
+    law = Ye2006(sinkage_exponent=exponent)
+    s = touched(law, speed=speed)
+    first, second = float(s[HIDDEN]), float(s[HIDDEN + 1])
+    z = share * float(s[BRANCH])
+    if not 1e-12 < z < 1e6:
+        return  # where the powers leave what numbers hold
+    force = evaluate(law, z, speed=speed)
+    if share < 1.0 - 1e-9 / abs(exponent):
+        assert force == first * z
+    elif share > 1.0 + 1e-9 / abs(exponent):
+        assert force == pytest.approx(second * z ** (1.0 + exponent), rel=1e-13)
+        assert force < first * z

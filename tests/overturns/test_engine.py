@@ -10,6 +10,8 @@ import pytest
 
 from rollover.dynamics.setup import set_up
 from rollover.dynamics.simulate import run
+from rollover.effects import EFFECTS as EVERY
+from rollover.effects.effect import Heard
 from rollover.proof.generator import Order
 from rollover.proof.overturns import engine, generator
 from rollover.proof.overturns.engine import CHANNELS, EFFECTS, overturn
@@ -107,6 +109,17 @@ def test_a_plan_has_effects_beside_the_engine_or_it_alone() -> None:
         plan(3, 1, ["foreign-engine"], ["soil-layer"])
 
 
+def test_a_gain_of_an_attitude_bears_the_name_of_the_table() -> None:
+    spans = dict.fromkeys(CHANNELS, 1.0)
+    for seed in range(40):
+        change = EFFECTS["sensor-gain"](np.random.default_rng(seed), spans)
+        kind = EVERY[change.id]
+        heard = Heard(change.channel, spans, 1.0, 0.0)
+        assert kind.looked_for_on(heard) is not None
+        assert set(change.parameters) == set(kind.search)
+        assert change.fault.gain == next(iter(change.parameters.values()))
+
+
 def test_without_the_engine_one_line_says_what_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine, "is_installed", lambda: False)
     with pytest.raises(ValueError, match=r"got foreign-engine; mujoco, which is not installed, .* 'rollover\[proof\]'"):
@@ -126,3 +139,5 @@ def test_a_case_is_recorded_by_the_other_engine(
     assert [e["id"] for e in case.truth["effects"]] == list(ids)
     assert all(tuple(r.channels) == CHANNELS for r in case.recordings)
     assert all(e["over_noise"] > 0.0 for e in case.truth["effects"])
+    assert len(case.references) == generator.REFERENCES
+    assert not any(r.conditions == one.conditions for r in case.references for one in case.recordings)

@@ -180,8 +180,11 @@ def test_memory_that_grows_in_a_run_changes_nothing(integrator: str, monkeypatch
     assert all(np.array_equal(wide.recording[c], own.recording[c]) for c in wide.recording.channels)
 
 
-def test_boxes_leave_out_only_points_that_touch_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario = short("side_overturn", **{"simulation.duration": 1.3, "simulation.integrator": "compiled"})
+@pytest.mark.parametrize(("name", "duration"), [("side_overturn", 1.3), ("cube_toss", 0.8), ("multiple_roll", 2.6)])
+def test_boxes_leave_out_only_points_that_touch_nothing(
+    name: str, duration: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = short(name, **{"simulation.duration": duration, "simulation.integrator": "compiled"})
     boxed = simulate.run(scenario)
     made: list[Tables] = []
 

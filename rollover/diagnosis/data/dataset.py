@@ -25,7 +25,6 @@ from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from rollover.recording.noise_floor import LENGTH, USUAL, NoiseFloor, grown, noise_floor
 from rollover.scenario import Scenario
-from rollover.system.errors import Fault
 
 Array = NDArray[np.float64]
 
@@ -52,6 +51,12 @@ class Signal:
     weight: Array | None = None  # (n,), below 1 where the model itself is not sure
     level: Array | None = None  # (n,), noise over `noise` where it grows with the value
     at_rest: tuple[float, tuple[float, ...]] | None = None  # noise and autocorrelation of quiet stretches
+    phase: str = ""  # the part of its channel that it is, see `data.stretches`
+
+    @property
+    def key(self) -> str:
+        """What its discrepancy is known by."""
+        return f"{self.channel} {self.phase}".rstrip()
 
     def cut(self, inside: NDArray[np.bool_]) -> Signal:
         """The samples that are `inside` (n,)."""
@@ -97,8 +102,9 @@ class Dataset:
     condition: str
     perturbed: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
     model_error: float = TUNING.model_error  # of a channel's range
-    discrepancy: Mapping[str, float] = field(default_factory=dict)  # by channel, a share of its range
-    memory: Mapping[str, float] = field(default_factory=dict)  # by channel, correlation time of that where known, s
+    discrepancy: Mapping[str, float] = field(default_factory=dict)  # by `Signal.key` or channel, a share of its range
+    memory: Mapping[str, float] = field(default_factory=dict)  # by the same, correlation time of that where known, s
+    taught_by: int = 0  # references whose common course was taken off its values
     averaged: int = 1  # samples in one
     first_impact: float = np.inf  # s, after which a run may take another course
     doubtful: tuple[Mapping[str, Any], ...] = ()  # values exchanged for 1 sigma of each uncertain condition
@@ -171,12 +177,13 @@ class Dataset:
         """What the model may miss a signal by, as a share of its range: integrators' error and the discrepancy."""
         if not self.discrepancy:
             return self.model_error
-        beside = max(self.discrepancy.get(s.channel, 0.0), TUNING.hidden_discrepancy * s.noise / s.span)
+        own = self.discrepancy.get(s.key, self.discrepancy.get(s.channel, 0.0))
+        beside = max(own, TUNING.hidden_discrepancy * s.noise / s.span)
         return float(np.hypot(self.model_error, beside))
 
     def shared(self, s: Signal) -> float:
         """Samples that share one error of the model: those of two correlation times, or of the whole signal, (D19)."""
-        time, known = self.recording.time[s.rows], self.memory.get(s.channel)
+        time, known = self.recording.time[s.rows], self.memory.get(s.key, self.memory.get(s.channel))
         if known is None:
             return float(time.size)
         return float(min(max(2.0 * known / float(np.median(np.diff(time))), 1.0), time.size))
@@ -335,15 +342,6 @@ def dataset_of(name: str, recording: Recording, simulator: Simulator, averaged: 
         condition=condition_name(recording.conditions),
         averaged=averaged,
     )
-
-
-def no_common_channel(simulator: Simulator, name: str, recording: Recording) -> list[Fault]:
-    """That nothing that was recorded is simulated, where that is so."""
-    made = simulator.predict({}, 0.0)
-    if made is None or made.keys() & recording.channels.keys():
-        return []
-    message = f"no channel that this scenario simulates, got {', '.join(recording.channels)}; one of them at least"
-    return [Fault(file=name, message=message)]
 
 
 def _oversampling(recording: Recording, channel: str) -> int:

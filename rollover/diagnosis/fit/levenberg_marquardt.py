@@ -112,9 +112,9 @@ class Problem(Simulations):
 
     @property
     def samples_per_draw(self) -> float:
-        """Samples that share one error in all recordings: a rig repeats its discrepancy, (D21), runs no scatter."""
-        is_repeated = self.samples_per_error > 1.0 and any(e.discrepancy for e in self.dataset)
-        return self.samples_per_error * (len(self.dataset) if is_repeated else 1)
+        """Samples that share one error in all recordings: a rig repeats its discrepancy, (D21), (D27); runs scatter."""
+        others = sum(bool(e.discrepancy) for e in self.dataset[1:]) / (1.0 + self.dataset[0].taught_by)
+        return self.samples_per_error * (1.0 + others if self.samples_per_error > 1.0 else 1.0)
 
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less predicted, stacked, SI, of each recording."""

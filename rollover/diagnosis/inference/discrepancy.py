@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.data.stretches import channel_of, stretches
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.result import Scale
@@ -26,12 +27,17 @@ SCALES = np.geomspace(TUNING.least_scale, TUNING.largest_scale, TUNING.scale_cou
 
 @dataclass(frozen=True, kw_only=True)
 class Discrepancy:
-    """Scale (share of the range) and correlation time (s) of each channel; `by_none` is what the scenario leaves."""
+    """Scale (share of the range) and correlation time (s) of each channel; `by_none` is what the scenario leaves.
+
+    By channel, of full runs by channel and side of the first impact: the keys are those of `Signal.key`.
+    """
 
     scales: Mapping[str, float]
     times: Mapping[str, float] = field(default_factory=dict)
     by_none: Mapping[str, float] = field(default_factory=dict)
-    is_estimated: bool = False  # by what explanations leave of the recordings themselves: neither stated nor taught
+    taught_by: int = 0  # references whose common course was taken off, so that the rest is new in each recording
+    is_estimated: bool = False  # by what explanations leave of the recordings themselves
+    is_taught: bool = False  # by recordings in which nothing is missing
 
     @property
     def is_usual(self) -> bool:
@@ -40,7 +46,7 @@ class Discrepancy:
 
     def at_most(self, bounds: Mapping[str, float]) -> Discrepancy:
         """The same with no scale above its channel's bound; a channel without one keeps its own."""
-        return replace(self, scales={c: min(s, bounds.get(c, s)) for c, s in self.scales.items()})
+        return replace(self, scales={k: min(s, bounds.get(channel_of(k), s)) for k, s in self.scales.items()})
 
     def is_clearly_above(self, other: Discrepancy) -> bool:
         """Whether another estimate is clearly smaller in any channel."""
@@ -52,12 +58,14 @@ class Discrepancy:
         for e in dataset:
             for s in e.signals:
                 spans.setdefault(s.channel, []).append(s.span)
+        known = {key: c for key in self.scales if (c := channel_of(key)) in spans}
         return {
-            c: Scale(
-                scale=share * float(np.median(spans[c])), unit=describe(c).unit, correlation_time=self.times.get(c)
+            key: Scale(
+                scale=self.scales[key] * float(np.median(spans[c])),
+                unit=describe(c).unit,
+                correlation_time=self.times.get(key),
             )
-            for c, share in self.scales.items()
-            if c in spans
+            for key, c in known.items()
         }
 
 
@@ -69,16 +77,15 @@ def posterior(left: float, draws: float = TUNING.draws) -> tuple[float, float]:
 
 
 def residual_rms(problem: Problem, fitted: Fitted) -> dict[str, float]:
-    """Root mean square that a fit leaves of each channel after first contact beyond noise, a share of its range."""
+    """Root mean square that a fit leaves of each channel in each of its `stretches` beyond noise, over its range."""
     found: dict[str, list[float]] = {}
     for e, residual in zip(problem.dataset, problem.residuals(fitted), strict=True):
         residual = without_condition_errors(e, residual)
         for s, part in e.spans():
-            after = e.recording.time[s.rows] >= e.simulator.contact
-            if after.any():
-                power = float(np.mean(residual[part][after] ** 2)) - s.noise**2
-                found.setdefault(s.channel, []).append(max(power, 0.0) / s.span**2)
-    return {channel: float(np.sqrt(np.mean(powers))) for channel, powers in found.items()}
+            for key, inside in stretches(e, s):
+                power = float(np.mean(residual[part][inside] ** 2)) - s.noise**2
+                found.setdefault(key, []).append(max(power, 0.0) / s.span**2)
+    return {key: float(np.sqrt(np.mean(powers))) for key, powers in found.items()}
 
 
 def without_condition_errors(e: Dataset, residual: Array) -> Array:
@@ -113,13 +120,14 @@ def learned_from_references(problem: Problem, base: Fitted) -> Discrepancy | Non
     """The discrepancy of recordings in which nothing is missing, a draw each; None if noise hides it everywhere."""
     left = residual_rms(problem, base)
     scales = {c: posterior(v, TUNING.draws * len(problem.dataset))[0] for c, v in left.items()}
-    hidden = {
-        s.channel
+    shows = any(
+        scales[key] * s.span > SETTINGS.data.dataset.other_error_share * s.noise
         for e in problem.dataset
         for s in e.signals
-        if scales[s.channel] * s.span > SETTINGS.data.dataset.other_error_share * s.noise
-    }
-    return Discrepancy(scales=scales, times=correlation_times(problem, base), by_none=left) if hidden else None
+        for key, _ in stretches(e, s)
+    )
+    times = correlation_times(problem, base)
+    return Discrepancy(scales=scales, times=times, by_none=left, is_taught=True) if shows else None
 
 
 def correlation_times(problem: Problem, fitted: Fitted) -> dict[str, float]:
@@ -128,19 +136,19 @@ def correlation_times(problem: Problem, fitted: Fitted) -> dict[str, float]:
     for e, residual in zip(problem.dataset, problem.residuals(fitted), strict=True):
         residual = without_condition_errors(e, residual)
         for s, part in e.spans():
-            time = e.recording.time[s.rows]
-            v = residual[part][time >= e.simulator.contact]
-            if v.size < 8:
-                continue
-            power = float(np.mean(v**2)) - s.noise**2
-            if power <= 0.0:
-                continue
-            lags = range(1, v.size // 2)
-            below = next((k for k in lags if float(np.mean(v[k:] * v[:-k])) < 0.5 * power), v.size // 2)
-            found.setdefault(s.channel, []).append(below * float(np.median(np.diff(time))) / np.log(2.0))
-    return {channel: float(np.median(times)) for channel, times in found.items()}
+            step = float(np.median(np.diff(e.recording.time[s.rows])))
+            for key, inside in stretches(e, s):
+                v = residual[part][inside]
+                power = float(np.mean(v**2)) - s.noise**2
+                if v.size < 8 or power <= 0.0:
+                    continue
+                lags = range(1, v.size // 2)
+                below = next((k for k in lags if float(np.mean(v[k:] * v[:-k])) < 0.5 * power), v.size // 2)
+                found.setdefault(key, []).append(below * step / np.log(2.0))
+    return {key: float(np.median(times)) for key, times in found.items()}
 
 
 def with_discrepancy(every: Sequence[Dataset], found: Discrepancy) -> list[Dataset]:
     """The evidence with a discrepancy of these scales and correlation times by channel."""
-    return [replace(e, discrepancy=dict(found.scales), memory=dict(found.times)) for e in every]
+    scales, times = dict(found.scales), dict(found.times)
+    return [replace(e, discrepancy=scales, memory=times, taught_by=found.taught_by) for e in every]

@@ -256,8 +256,8 @@ def matters(problem: Problem, base: Fitted, before: Mismatch) -> bool:
     """Whether the structure of the misfit is worth a word: beyond a share of a channel's range."""
     most = 0.0
     for r, e in enumerate(problem.dataset[: len(base.blocks)]):
-        for signal, _ in e.spans():
-            cells = [c for c in before.cells if c.recording == r and c.channel == signal.channel]
+        for signal, part in e.spans():
+            cells = [c for c in before.cells if c.recording == r and part.start <= c.rows[0] < part.stop]
             chance = sum(c.rows.size if e.model_error_dominates(signal) else c.expected for c in cells)
             power = (sum(c.structured for c in cells) - chance) / max(sum(c.rows.size for c in cells), 1)
             most = max(most, float(np.sqrt(max(power, 0.0))) * signal.sigma / signal.span)

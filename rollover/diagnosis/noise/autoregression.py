@@ -331,6 +331,13 @@ def with_noise(s: Signal, noise: float, ar: tuple[float, ...], model_error: floa
     return replace(s, noise=noise, sigma=sigma, ar=ar if noise >= TUNING.least_noise_share * sigma else ())
 
 
+def with_own_model_error(e: Dataset) -> Dataset:
+    """The evidence with each part of a channel, where it has two, held against what the model may miss there."""
+    if not any(s.phase for s in e.signals):
+        return e
+    return replace(e, signals=tuple(with_noise(s, s.noise, s.quiet[1], e.model_error_of(s)) for s in e.signals))
+
+
 def _quieter(misfits: Sequence[Array], own: Sequence[Array]) -> NoiseFloor | None:
     """Noise of misfits, or of the channels themselves where that shows clearly less; None of too little."""
     if sum(v.size // LENGTH for v in misfits) < 1:

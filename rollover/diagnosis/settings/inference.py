@@ -57,6 +57,8 @@ class Discrepancy:
     # share of the way down: least correlation time of a discrepancy, as it keeps its sign over a good part of a phase
     # (a wave of two turns on the way down: 1/(2*6 ln 2) = 0.12); what is quicker and repeats is none
     shortest: float = 0.1
+    # references that teach a course: of two each would be predicted by one other, which tells no mean from its own
+    least_references: int = 3
 
 
 @dataclass(frozen=True, kw_only=True)

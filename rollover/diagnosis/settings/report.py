@@ -77,6 +77,7 @@ class Statements:
     clock_errors: float = 3.0
     # share of a strength: the end of a logarithmic interval is lowered by it in the comparison with none; chosen
     near_zero: float = 0.2
+    spelt_out_scales: int = 6  # scales of a background that a sentence spells out; chosen
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,6 +21,7 @@ TYRES = ("front_left", "front_right", "rear_left", "rear_right")
 LATERAL = {"front_left": 110e3, "front_right": 110e3, "rear_left": 175e3, "rear_right": 175e3}
 MOUNTS = ("left", "right")
 YIELD_X = 15_000.0
+SCALED = ("chassis/roll",)  # the same law on a place or an attitude is a scale in the table of effects
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +148,10 @@ def _sensor(id: str, fault: Callable[[Random, float], tuple[dict[str, float], Fa
     def draw(random: Random, spans: Mapping[str, float]) -> Change:
         channel = str(random.choice(sorted(spans)))
         parameters, wrong = fault(random, spans[channel])
-        return Change(id=id, kind="sensor", parameters=parameters, channel=channel, fault=wrong)
+        name = id
+        if id == "sensor-gain" and channel in SCALED:
+            name, parameters = "sensor-scale", {"scale": parameters["gain"]}
+        return Change(id=name, kind="sensor", parameters=parameters, channel=channel, fault=wrong)
 
     return draw
 
