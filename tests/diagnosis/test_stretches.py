@@ -150,7 +150,7 @@ def test_an_early_effect_shows_beside_a_late_difference() -> None:
         problem = held_against(every, replace(learned, scales=scales, times={}))
         fitted = problem.fit((HEIGHT,), (0.5,))
         assert fitted is not None
-        gains[how] = (base_of(problem).chi2 - fitted.left) / problem.samples_per_draw
+        gains[how] = (base_of(problem).chi2 - fitted.chi2) / problem.samples_per_draw
         if how == "sides":
             assert -0.1 + 0.2 * fitted.x[0] == pytest.approx(0.08, abs=0.002)
     # beyond what the best of a hundred candidates gains by chance, Sidak's 1 - 1e-3/100 quantile of chi^2 of one: 19.5
