@@ -14,13 +14,15 @@ from ground.law import GroundLaw
 from ground.quantity import Later, Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover.effects import EFFECTS, entries, nothing
-from rollover.inputs import Input, check_inputs
 from rollover.recording.filters import least_rate
+from rollover.recording.signal_file import read_signal
 from rollover.spec import document
 from rollover.spec.estimates import Estimate, wheel_estimates
 from rollover.spec.excitation import Excitation
 from rollover.spec.footing import check_standing, check_turning
 from rollover.spec.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
+from rollover.spec.inputs import Input, check_inputs
+from rollover.spec.inputs.signal import READERS
 from rollover.spec.laws import laws
 from rollover.spec.rops import Rops
 from rollover.spec.stand import PendulumBlow, StaticTest, TiltTable
@@ -29,6 +31,8 @@ from rollover.spec.standards.static_sequence import sequence
 from rollover.spec.steel import Steel
 from rollover.spec.vehicle import RigidBody, Striker, Vehicle
 from rollover.system import own_code
+
+READERS["file"] = read_signal  # signals out of recordings, which `spec` knows nothing of
 
 AnyVehicle = Annotated[Vehicle | Striker | RigidBody, ByKind()]
 AnyLaw = Annotated[GroundLaw, ByKind(laws)]  # whatever law stands in the folder `ground` or in a file of one's own

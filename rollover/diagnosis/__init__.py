@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rollover.diagnosis.io import diagnose_folder, diagnosed_text, json_of
-from rollover.diagnosis.pipeline import diagnose
+from rollover.diagnosis.io import diagnosed_text, json_of
+from rollover.diagnosis.pipeline import diagnose, diagnose_folder
 from rollover.diagnosis.result import Diagnosis
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_folder", "diagnosed_text", "json_of"]

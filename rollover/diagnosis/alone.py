@@ -5,23 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.cross_validation import Groups, held_out
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, is_at_bound
 from rollover.diagnosis.fit.local_search import with_time_shift_search
-from rollover.diagnosis.fit.step import Groups, Step
+from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.grades import jackknifed, share_beyond, share_of, shares
-from rollover.diagnosis.inference.adequacy import is_tolerated
-from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import is_tolerated, mismatch_of
 from rollover.diagnosis.inference.repeated_course import predicted_by_others, quick_channels
 from rollover.diagnosis.inference.residual_law import fitted_law
 from rollover.diagnosis.probabilities import credible, log_evidence
 from rollover.diagnosis.result import Verdict
-from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.decision import Explanation, kind_of
 from rollover.diagnosis.selection.ensemble_validation import restarted_base
-from rollover.diagnosis.selection.forward_step import by_chance, confusion, ends_at_bound, step
-from rollover.diagnosis.selection.scan import look
-from rollover.diagnosis.selection.stepwise import with_conditions_refitted
+from rollover.diagnosis.selection.explanation import Explanation, kind_of, with_conditions_refitted
+from rollover.diagnosis.selection.forward_step import by_chance, confusion_set, step
+from rollover.diagnosis.selection.scan import score_candidates
 from rollover.diagnosis.settings import SETTINGS
 from rollover.scenario import Scenario
 
@@ -37,18 +35,18 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
     clocked = restarted_base if problem.effort.is_ensemble else with_time_shift_search
     base = clocked(problem, base)
     before = mismatch_of(problem.dataset, base.blocks, phases)
-    looked = look(problem, base, inquiry.candidates, groups, parallel_map=inquiry.executor.parallel_map)
-    first = step(inquiry, base, looked)
+    scored = score_candidates(problem, base, inquiry.candidates, groups, parallel_map=inquiry.executor.parallel_map)
+    first = step(inquiry, base, scored)
     if first is None:
         return Explanation(
-            base=base, fitted=base, parts=(), looked=looked, detectable=looked.detectable, before=before, after=before
+            base=base, fitted=base, parts=(), scored=scored, detectable=scored.detectable, before=before, after=before
         )
     first, left = with_conditions_refitted(
         problem, first, mismatch_of(problem.dataset, first.fitted.blocks, phases), phases
     )
     if problem.samples_per_error > 1.0:
         # a rig repeats its discrepancy: it is one draw for all recordings, however many there are, (D21)
-        first = replace(first, p_value=by_chance(first.base, first.rivals, looked, problem.samples_per_draw))
+        first = replace(first, p_value=by_chance(first.base, first.rivals, scored, problem.samples_per_draw))
     first = first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map)
     leader = best_predictor(problem, first, groups)
     if leader is not first.fitted:
@@ -58,8 +56,8 @@ def fit_single_effect(inquiry: Inquiry, base: Fitted) -> Explanation:
         base=first.base,
         fitted=first.fitted,
         parts=(first,),
-        looked=looked,
-        detectable=looked.detectable,
+        scored=scored,
+        detectable=scored.detectable,
         before=before,
         after=left,
         first=first,
@@ -72,8 +70,8 @@ def best_predictor(problem: Problem, one: Step, groups: Groups) -> Fitted:
     Conditions held out tell first. Between what predicts them as well, the squares of all samples would prefer what
     bends to the one channel that the discrepancy touches least; what is left of each channel counts alike.
     """
-    able = [one.fitted, *(f for f in one.rivals if not ends_at_bound(f) and f is not one.fitted)]
-    ahead = min(able, key=lambda f: held_out(f, groups).left.sum())
+    able = [one.fitted, *(f for f in one.rivals if not is_at_bound(f) and f is not one.fitted)]
+    ahead = min(able, key=lambda f: held_out(f, groups).chi2.sum())
 
     def is_behind(f: Fitted) -> bool:
         more = share_beyond(problem, one.base, f, ahead, groups)
@@ -103,7 +101,7 @@ def verdict_on_single_effect(
     whole, _ = shares(problem, found, groups)
     if whole is not None and whole.low > 0.0:
         nothing = "unexplained"
-    families = {f.candidates[-1].family for f in confusion(found.parts[0], groups, problem.samples_per_error)}
+    families = {f.candidates[-1].family for f in confusion_set(found.parts[0], groups, problem.samples_per_error)}
     is_enough = (
         whole is not None
         and whole.share >= TUNING.half_share
@@ -126,15 +124,15 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
     one of those that hold the right one with 95 % by what they leave, (D24), if it explains half as much, or is of the
     same family.
     """
-    near = confusion(one, groups, problem.samples_per_error)
-    best, start = one.fitted, float(held_out(one.base, groups).left.sum())
-    most = start - float(held_out(best, groups).left.sum())
+    near = confusion_set(one, groups, problem.samples_per_error)
+    best, start = one.fitted, float(held_out(one.base, groups).chi2.sum())
+    most = start - float(held_out(best, groups).chi2.sum())
     probable = credible(problem, one.rivals)
     for rival in one.rivals:
-        becomes_best = len(rival.x) > len(best.x) and ends_at_bound(rival)
+        becomes_best = len(rival.x) > len(best.x) and is_at_bound(rival)
         if becomes_best or any(rival is f for f in near):
             continue
-        gain = start - float(held_out(rival, groups).left.sum())
+        gain = start - float(held_out(rival, groups).chi2.sum())
         is_kin = rival.candidates[-1].family == best.candidates[-1].family
         is_probable = (is_kin or gain > TUNING.half_share * most) and any(rival is f for f in probable)
         if ((is_kin or is_tolerated(problem, rival)) and gain >= TUNING.nearly_all * most) or is_probable:

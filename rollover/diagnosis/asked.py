@@ -1,22 +1,32 @@
-"""A diagnosis as it is asked for from Python: files or objects, recordings from anywhere, a scenario or a model."""
+"""A diagnosis as it is asked for: files or objects, a scenario or a model; sensors are checked before any model is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
+from rollover.assessment import results
 from rollover.calibration.posterior import draws_of
 from rollover.comparison.recordings import Recordings, held_out, measured
-from rollover.diagnosis import sensors_first
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.own_model import ForwardModel, diagnose_model, load_model
-from rollover.diagnosis.own_model.declaration import declared
+from rollover.diagnosis.forward.forward_model import set_up
+from rollover.diagnosis.own_model.declaration import ForwardModel, declared, load_model
+from rollover.diagnosis.own_model.pipeline import diagnose_model
 from rollover.diagnosis.own_model.tables import tables
+from rollover.diagnosis.pipeline import diagnose
 from rollover.diagnosis.result import Diagnosis, Estimate
+from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import unfit
+from rollover.recording import Recording
+from rollover.recording.checks import Finding, prechecks, shared_rails
 from rollover.scenario import Scenario, given
 from rollover.system.arguments import listed, within
 from rollover.system.errors import Fault, InputError
+
+PRECHECKS = SETTINGS.report.sensors_first
+Findings = Sequence[tuple[str, Finding]]
 
 
 def check_is_drop(scenario: Scenario, by: str) -> None:
@@ -59,11 +69,11 @@ def diagnosed(
     if draws:
         check_is_drop(chosen, "posterior")
     known = measured(recordings, profile)
-    sensors_first.check(chosen, known)
+    check_conditions(chosen, known)
     held = held_out(list(known), listed(hold_out)) if hold_out else []
     with Executor(workers) as executor:
-        findings = sensors_first.sensor_precheck(chosen, known)
-        return sensors_first.diagnosed(
+        findings = sensor_precheck(chosen, known)
+        return diagnosed_with_prechecks(
             chosen,
             known,
             findings,
@@ -74,3 +84,70 @@ def diagnosed(
             posterior=draws,
             executor=executor,
         )
+
+
+def check_conditions(scenario: Scenario, measured: Mapping[str, Recording]) -> None:
+    """Refuse conditions that the scenario does not know, all at once. Raises `InputError`."""
+    faults: list[Fault] = []
+    for recording in measured.values():
+        try:
+            set_up(scenario, recording)
+        except InputError as e:
+            faults += e.faults
+    if faults:
+        raise InputError(*faults)
+
+
+def sensor_precheck(scenario: Scenario, measured: Mapping[str, Recording]) -> list[tuple[str, Finding]]:
+    """Name of the recording and finding, for what the recordings alone give away about their sensors."""
+    found = []
+    for name, recording in measured.items():
+        own = set_up(scenario, recording)
+        mass = getattr(own.vehicle, "mass", None)
+        found += [(name, f) for f in prechecks(recording, mass=mass, gravity=own.gravity)]
+    found_before = {(name, f.check, f.channel) for name, f in found}
+    return found + [(name, f) for name, f in shared_rails(measured) if (name, f.check, f.channel) not in found_before]
+
+
+def diagnosed_with_prechecks(
+    scenario: Scenario,
+    measured: Mapping[str, Recording],
+    findings: Findings,
+    *,
+    hold_out: Sequence[str] = (),
+    tolerance: float | Mapping[str, float] = 0.0,
+    reference: Sequence[str] = (),
+    estimate: Estimate = "unexplained",
+    posterior: int = 0,
+    say: Callable[[str], None] = lambda _: None,
+    executor: Executor | None = None,
+) -> Diagnosis:
+    """Diagnose, see `diagnose`; what the sensors gave away stands first among the notes. Raises `InputError`."""
+    found = diagnose(
+        scenario,
+        list(measured.items()),
+        hold_out=hold_out,
+        tolerance=tolerance,
+        reference=reference,
+        estimate=estimate,
+        posterior=posterior,
+        say=say,
+        executor=executor,
+    )
+    return replace(found, notes=(*finding_lines(findings), *found.notes))
+
+
+def finding_lines(findings: Findings) -> Iterator[str]:
+    """A line for each finding; of many alike in one channel of one recording the first ones, and how many more."""
+    alike: dict[tuple[str, str, str], list[str]] = {}
+    for name, f in findings:
+        alike.setdefault((name, f.channel, f.check), []).append(f.sentence)
+    for (name, channel, check_), sentences in alike.items():
+        yield from (f"{name}: {channel}: {s}" for s in sentences[: PRECHECKS.spelt_out])
+        if len(sentences) > PRECHECKS.spelt_out:
+            yield f"{name}: {channel}: {len(sentences) - PRECHECKS.spelt_out} more such findings ({check_})"
+
+
+def plain_findings(findings: Findings) -> list[dict[str, Any]]:
+    """The findings as bare values, for diagnosis.json."""
+    return [{"recording": name, **results.plain(asdict(f))} for name, f in findings]

@@ -8,48 +8,46 @@ from functools import partial
 
 from rollover.diagnosis.alone import alike_beside, fit_single_effect, verdict_on_single_effect
 from rollover.diagnosis.data.dataset import Dataset, left_out, with_uncertain_conditions_at
-from rollover.diagnosis.data.inconsistent import Aside, inconsistency_evidence
+from rollover.diagnosis.data.inconsistent import Aside, inconsistency_sentences
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.data.repeatability import inconsistent_repeats
+from rollover.diagnosis.fit.cross_validation import Groups
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import has_uncertain_conditions, refitted_with_conditions
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Groups, Step
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.step import Inquiry, Step
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.forward_model import set_up
-from rollover.diagnosis.grades import graded, with_shares
-from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
-from rollover.diagnosis.inference.condition_pulls import pull_notes
+from rollover.diagnosis.grades import cannot_tell, graded, with_shares
 from rollover.diagnosis.inference.discrepancy import Discrepancy
-from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import is_enough, is_tolerated, mismatch_of
 from rollover.diagnosis.inference.recording_faults import RecordingFault, intrinsic_faults, misread, truncation_fault
-from rollover.diagnosis.invariants import clear_of_null, is_noise_alone, next_best, rejected_effects
+from rollover.diagnosis.invariants import NAMING, clear_of_null, is_noise_alone, next_best, rejected_effects
 from rollover.diagnosis.noise.offsets import zero_notes
 from rollover.diagnosis.noise.truncation import truncation_notes
-from rollover.diagnosis.power import cannot_tell
 from rollover.diagnosis.prepared import weighted_datasets
 from rollover.diagnosis.result import Answer, Diagnosis, Named, Verdict
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import (
-    Explanation,
     by_first_effect,
     explained,
     explains_little,
     redundant_effects,
     verdict_on,
 )
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     interval_contains_null,
     named,
+    pull_notes,
 )
 from rollover.dynamics.drop_test import unfit
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 
-NAMING = ("parameter", "sensor", "missing-physics")  # verdicts that name effects
 TUNING = SETTINGS.report.conclusion
 AS_NOISE = "what is left is 1.0 times the noise, or hardly more and before the first contact: no more than noise"
 
@@ -79,8 +77,9 @@ class Asked:
 class Conclusion:
     """What recordings say: the explanation, its verdict and grade, and what it was drawn from.
 
-    `tried` is the explanation before what does not explain was refused, `slight` are effects of no consequence, `shown`
-    is what recordings show by themselves, `validation` are those that were held out, `groups` what is left out in turn.
+    `tried` is the explanation before what does not explain was refused, `slight` are effects of no consequence,
+    `recording_fault` is what recordings show by themselves, `validation` are those that were held out, `groups` what is
+    left out in turn.
     """
 
     asked: Asked
@@ -91,7 +90,7 @@ class Conclusion:
     grade: Answer
     effects: tuple[Named, ...]
     slight: tuple[Named, ...]
-    shown: RecordingFault | None
+    recording_fault: RecordingFault | None
     validation: tuple[Dataset, ...]
     groups: Groups
     candidates: Sequence[Candidate]
@@ -124,15 +123,15 @@ def is_beside(asked: Asked, problem: Problem) -> bool:
 def concluded(
     asked: Asked, every: Sequence[Dataset], inconsistencies: Sequence[Aside], notes: Sequence[str]
 ) -> Conclusion | Diagnosis:
-    """What recordings without what was left aside say; the diagnosis itself where there is too little to judge."""
+    """The conclusion from what was not excluded; the diagnosis itself where there is too little to judge."""
     scenario, hold_out = asked.scenario, asked.hold_out
     executor, began, names = asked.executor, asked.began, list(asked.recordings)
     assert scenario is not None
-    notes = [*notes, *(inconsistency.says() for inconsistency in inconsistencies)]
+    notes = [*notes, *(inconsistency.message() for inconsistency in inconsistencies)]
     found = weighted_datasets(scenario, [e for e in every if e.name not in hold_out])
     validation = [e for e in weighted_datasets(scenario, every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < TUNING.least_samples:
-        return cannot_tell(every, names, notes, began, inconsistency_evidence(inconsistencies))
+        return cannot_tell(every, names, notes, began, inconsistency_sentences(inconsistencies))
     notes += [*truncation_notes(every, found), *zero_notes(found)]
     groups = left_out(found)
     notes += inconsistent_repeats(found)
@@ -141,7 +140,7 @@ def concluded(
         notes.append("one condition only: what stands as held out is predicted by the fit to it")
     problem = Problem(found)
     executor.begin(problem)
-    align(problem)
+    estimate_time_shifts(problem)
     base = problem.fit((), ())
     if base is None:
         return cannot_tell(every, names, [*notes, "the scenario itself could not be simulated"], began)
@@ -152,7 +151,7 @@ def concluded(
     inquiry = Inquiry(
         problem=problem, candidates=candidates, groups=groups, phases=phases, say=asked.say, executor=executor
     )
-    return weighed(
+    return conclusion_of(
         asked,
         inquiry,
         base,
@@ -164,7 +163,7 @@ def concluded(
     )
 
 
-def weighed(
+def conclusion_of(
     asked: Asked,
     inquiry: Inquiry,
     base: Fitted,
@@ -175,76 +174,29 @@ def weighed(
     inconsistencies: Sequence[Aside] = (),
     notes: Sequence[str] = (),
 ) -> Conclusion:
-    """What an inquiry comes to beside a base: an explanation, whether it is named, and how much of all it explains.
+    """The conclusion of an inquiry beside a base: explanation, verdict, grade, and effects with their numbers.
 
     `validation` are recordings that were held out, `acts` what kind of test they are of.
     """
-    problem, groups, phases, recordings = inquiry.problem, inquiry.groups, inquiry.phases, asked.recordings
-    found, notes = list(problem.dataset), list(notes)
+    problem, groups, notes = inquiry.problem, inquiry.groups, list(notes)
     beside = is_beside(asked, problem)
-    is_taught = asked.discrepancy is not None and asked.discrepancy.is_taught
-    if beside:
-        explanation = tried = fit_single_effect(inquiry, base)
-    else:
-        explanation = tried = explained(inquiry, base)
-
-    def decide(found: Explanation) -> tuple[Explanation, Verdict]:
-        return (
-            verdict_on_single_effect(problem, found, groups, is_taught=is_taught)
-            if beside
-            else verdict_on(problem, found, groups, phases)
-        )
-
-    def name_all(found: Explanation, verdict: str) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
-        alike = partial(alike_beside, problem, groups=groups) if beside else None
-        return _refitted_explanation(problem, found, verdict, validation, groups, phases, alike)
-
-    explanation, verdict = decide(explanation)
-    held, named_so = problem.dataset, name_all(explanation, verdict)
-    nothing: set[str] = set()
-    while (
-        more := redundant_effects(problem, named_so[0], interval_contains_null(named_so[1], problem.effort.is_ensemble))
-        - nothing
-    ):
-        # what may as well be nothing is none of it: what came first explains what there is alone, or nothing does
-        nothing |= more
-        problem.with_noise_model(held)
-        alone = by_first_effect(problem, explanation, nothing, phases)
-        explanation, verdict = decide(alone)
-        named_so = name_all(explanation, verdict)
-    while more := rejected_effects(problem, *named_so[:2], groups, in_doubt=asked.estimates) - nothing:
-        nothing |= more
-        problem.with_noise_model(held)
-        explanation, verdict = decide(next_best(problem, explanation, nothing, groups, phases))
-        named_so = name_all(explanation, verdict)
-    explanation, effects, validation = named_so
+    tried = fit_single_effect(inquiry, base) if beside else explained(inquiry, base)
+    explanation, verdict, effects, validation = _findings(asked, inquiry, tried, validation, beside=beside)
     effects = clear_of_null(problem, explanation, effects) if asked.estimates else effects
-    found = list(problem.dataset)
     # beside a discrepancy what is met is no more than that and noise: what is surely predicted all the same is more
     is_open = asked.estimates and verdict == "unexplained" and not beside
     if is_open and is_noise_alone(problem, explanation, groups):
         verdict = "no-mismatch"
         notes.append(AS_NOISE)
-    enough = is_tolerated if beside else partial(is_enough, left=explanation.after)
-    left = not enough(problem, explanation.fitted)
-    grade, effects = graded(*with_shares(problem, explanation, effects, groups), is_beside=beside, remains=left)
+    enough = is_tolerated if beside else partial(is_enough, mismatch=explanation.after)
+    remains = not enough(problem, explanation.fitted)
+    grade, effects = graded(*with_shares(problem, explanation, effects, groups), is_beside=beside, remains=remains)
     slight = effects if asked.estimates and grade == "immaterial" else ()
     if asked.estimates and (slight or (effects and grade == "unexplained")):
         verdict, effects, explanation = "no-mismatch" if slight else "unexplained", (), explanation.refused()
-    shown = None
-    if verdict == "no-mismatch":
-        shown = intrinsic_faults(found, recordings, phases, explanation.p_value) or misread(
-            inconsistencies, len(found), explanation.p_value
-        )
-    elif effects and explains_little(explanation, groups, TUNING.main_share):
-        # what is lost again and again is met by no effect, and bends those that are fitted to it
-        shown = truncation_fault(found, recordings, phases, explanation.p_value)
-        if shown is not None and not (
-            explains_little(explanation, groups) or shown.is_covered_by(e.channel for e in effects)
-        ):
-            shown = None  # what another channel loses is no reason to doubt them
-    if shown is not None:
-        verdict, effects = shown.verdict, shown.effects
+    recording_fault = _recording_fault(asked, inquiry, explanation, verdict, effects, inconsistencies)
+    if recording_fault is not None:
+        verdict, effects = recording_fault.verdict, recording_fault.effects
         explanation = explanation.refused()
     notes += pull_notes(problem, explanation.fitted)
     return Conclusion(
@@ -256,7 +208,7 @@ def weighed(
         grade=grade,
         effects=effects,
         slight=slight,
-        shown=shown,
+        recording_fault=recording_fault,
         validation=tuple(validation),
         groups=groups,
         candidates=inquiry.candidates,
@@ -266,6 +218,71 @@ def weighed(
         inconsistencies=tuple(inconsistencies),
         notes=tuple(notes),
     )
+
+
+def _findings(
+    asked: Asked, inquiry: Inquiry, tried: Explanation, validation: Sequence[Dataset], *, beside: bool
+) -> tuple[Explanation, Verdict, tuple[Named, ...], list[Dataset]]:
+    """What is named of an explanation: its verdict, the effects with their numbers, and the recordings for validation.
+
+    Effects whose work others do, that predict nothing, or that may be null are refuted one set after another, each time
+    from the noise model before any was named.
+    """
+    problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
+    is_taught = asked.discrepancy is not None and asked.discrepancy.is_taught
+    alike = partial(alike_beside, problem, groups=groups) if beside else None
+
+    def decide(found: Explanation) -> tuple[Explanation, Verdict]:
+        return (
+            verdict_on_single_effect(problem, found, groups, is_taught=is_taught)
+            if beside
+            else verdict_on(problem, found, groups, phases)
+        )
+
+    def refit(found: Explanation, verdict: str) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
+        return _refitted_explanation(problem, found, verdict, validation, groups, phases, alike)
+
+    explanation, verdict = decide(tried)
+    held, refitted = problem.dataset, refit(explanation, verdict)
+    refuted: set[str] = set()
+    while (
+        more := redundant_effects(problem, refitted[0], interval_contains_null(refitted[1], problem.effort.is_ensemble))
+        - refuted
+    ):
+        # the first effect explains all alone, or nothing does
+        refuted |= more
+        problem.with_noise_model(held)
+        explanation, verdict = decide(by_first_effect(problem, explanation, refuted, phases))
+        refitted = refit(explanation, verdict)
+    while more := rejected_effects(problem, *refitted[:2], groups, in_doubt=asked.estimates) - refuted:
+        refuted |= more
+        problem.with_noise_model(held)
+        explanation, verdict = decide(next_best(problem, explanation, refuted, groups, phases))
+        refitted = refit(explanation, verdict)
+    explanation, effects, marginalised = refitted
+    return explanation, verdict, effects, marginalised
+
+
+def _recording_fault(
+    asked: Asked,
+    inquiry: Inquiry,
+    explanation: Explanation,
+    verdict: Verdict,
+    effects: Sequence[Named],
+    inconsistencies: Sequence[Aside],
+) -> RecordingFault | None:
+    """What recordings show by themselves where nothing is named, or losses where what is named explains little."""
+    found, p_value = list(inquiry.problem.dataset), explanation.p_value
+    if verdict == "no-mismatch":
+        fault = intrinsic_faults(found, asked.recordings, inquiry.phases, p_value)
+        return fault or misread(inconsistencies, len(found), p_value)
+    if not effects or not explains_little(explanation, inquiry.groups, TUNING.main_share):
+        return None
+    # what is lost again and again is met by no effect, and biases those that are fitted to it
+    fault = truncation_fault(found, asked.recordings, inquiry.phases, p_value)
+    is_theirs = fault is not None and fault.is_covered_by(e.channel for e in effects)
+    # what another channel loses is no reason to doubt them
+    return fault if is_theirs or explains_little(explanation, inquiry.groups) else None
 
 
 def _refitted_explanation(

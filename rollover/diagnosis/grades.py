@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time as clock
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.parameterisation import Candidate, with_slices
-from rollover.diagnosis.fit.step import Groups
-from rollover.diagnosis.result import Answer, Named, Share, Verdict
-from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.fit.cross_validation import Groups, held_out
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
+from rollover.diagnosis.fit.parameterisation import Candidate, strength_parameter, with_slices
+from rollover.diagnosis.result import Answer, Diagnosis, Named, Share, Verdict
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.statements import noise
+from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.report.grades
+POWER = SETTINGS.report.power
 LOADS = ("force", "moment", "acceleration")  # in the names of channels that are loads, or tell one
 
 
@@ -35,7 +39,7 @@ def shares(problem: Problem, found: Explanation, groups: Groups) -> tuple[Share 
     due = _due(problem, found.base, groups)
     each = {}
     for step in found.parts:
-        without, with_ = held_out(step.base, groups).left, held_out(step.fitted, groups).left
+        without, with_ = held_out(step.base, groups).chi2, held_out(step.fitted, groups).chi2
         each[step.fitted.candidates[-1].key] = jackknifed(without - with_, due, groups)
     return whole, each
 
@@ -50,13 +54,13 @@ def share_beyond(problem: Problem, base: Fitted, one: Fitted, other: Fitted, gro
     due = _due(problem, base, groups)
     if float(np.sum(due)) <= 0.0:
         return None
-    return jackknifed(held_out(one, groups).left - held_out(other, groups).left, due, groups)
+    return jackknifed(held_out(one, groups).chi2 - held_out(other, groups).chi2, due, groups)
 
 
 def _due(problem: Problem, base: Fitted, groups: Groups) -> Array:
     """What a base leaves of each recording held out beyond what noise does, (recordings,)."""
     noise = np.array([_noise_sum_of_squares(e) for e in problem.dataset])
-    return np.asarray(held_out(base, groups).left - noise)
+    return np.asarray(held_out(base, groups).chi2 - noise)
 
 
 def jackknifed(gained: Array, due: Array, groups: Groups) -> Share:
@@ -68,11 +72,11 @@ def jackknifed(gained: Array, due: Array, groups: Groups) -> Share:
     from scipy.special import stdtrit
 
     share = float(gained.sum() / due.sum())
-    left = np.array([float(np.sum(gained[list(g)] - share * due[list(g)])) for g in groups])
-    m = left.size
+    deviations = np.array([float(np.sum(gained[list(g)] - share * due[list(g)])) for g in groups])
+    m = deviations.size
     if m < 2:
         return Share(share=min(share, 1.0), low=-np.inf, high=1.0)
-    error = float(np.sqrt(m / (m - 1) * np.sum(left**2)) / due.sum())
+    error = float(np.sqrt(m / (m - 1) * np.sum(deviations**2)) / due.sum())
     wide = float(stdtrit(m - 1, TUNING.one_sided_confidence)) * error
     return Share(share=min(share, 1.0), low=share - wide, high=min(share + wide, 1.0))
 
@@ -98,8 +102,8 @@ def with_shares(
         named = [e for e in effects if (e.id, e.channel) == (c.id, c.channel)]
         moves = moved(problem, found.fitted, others, x) if c.kind != "sensor" and named else None
         with_grades += [replace(e, explains=each.get(c.key), moves=moves) for e in named]
-    place = {(e.id, e.channel): n for n, e in enumerate(effects)}
-    return tuple(sorted(with_grades, key=lambda e: place[e.id, e.channel])), whole
+    rank = {(e.id, e.channel): n for n, e in enumerate(effects)}
+    return tuple(sorted(with_grades, key=lambda e: rank[e.id, e.channel])), whole
 
 
 def moved(problem: Problem, fitted: Fitted, others: Sequence[Candidate], x: Sequence[float]) -> float | None:
@@ -158,3 +162,51 @@ def graded(
     alike = any(e.indistinguishable_from for e in effects)
     answer: Answer = "part" if remains else "likeness" if alike or is_beside else "whole"
     return answer, tuple(replace(e, answer="immaterial" if is_immaterial(e) else answer) for e in effects)
+
+
+def is_underpowered(detectable: Mapping[str, float]) -> bool:
+    """Whether even typical strengths of most effects would have stayed below what shows; of all, where no ground acts.
+
+    How many others there are is a matter of the vehicle, not of what its recordings tell.
+    """
+    typical = {
+        name: value
+        for name, value in detectable.items()
+        if name in EFFECTS and EFFECTS[name].kind == "physics" and None not in EFFECTS[name].null.values()
+    }  # of a limit, and of what the scenario has already, nothing is usual
+    blind = 0
+    for name, value in typical.items():
+        parameter, null = strength_parameter(name, EFFECTS[name].search)
+        usual = getattr(EFFECTS[name](), parameter, None)
+        blind += usual is None or value > abs(usual - null)
+    acts = any(channel.startswith("ground/") for name in typical for channel in EFFECTS[name].channels)
+    return blind > POWER.blind_share * len(typical) if acts else blind == len(typical)
+
+
+def cannot_tell(
+    dataset: Sequence[Dataset], names: Sequence[str], notes: Sequence[str], began: float, why: str = ""
+) -> Diagnosis:
+    """The answer where there is too little to judge."""
+    return Diagnosis(
+        verdict="cannot-tell",
+        sentence=f"There is too little in these recordings to be compared with the simulation.{why}",
+        p_value=1.0,
+        noise=noise(dataset),
+        where=(),
+        effects=(),
+        remaining_significant=False,
+        remaining_p_value=1.0,
+        remaining_where=(),
+        depends_on=None,
+        dependencies=(),
+        smallest_detectable={},
+        training=tuple(names),
+        held_out=(),
+        before={},
+        after={},
+        per_recording=(),
+        candidates=(),
+        simulations=0,
+        seconds=clock.perf_counter() - began,
+        notes=tuple(notes),
+    )

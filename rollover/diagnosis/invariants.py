@@ -8,16 +8,15 @@ from math import isfinite
 
 import numpy as np
 
-from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.data.phases import Phases
+from rollover.diagnosis.fit.cross_validation import Groups, held_out
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, is_at_bound
 from rollover.diagnosis.fit.parameterisation import coordinate, physical, strength_parameter
-from rollover.diagnosis.fit.step import Groups, Phases
 from rollover.diagnosis.inference.intervals import held_at
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.result import Diagnosis, Named
-from rollover.diagnosis.selection.decision import Explanation
-from rollover.diagnosis.selection.forward_step import ends_at_bound
-from rollover.diagnosis.selection.stepwise import with_conditions_refitted
+from rollover.diagnosis.selection.explanation import Explanation, with_conditions_refitted
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import is_null_effect
 from rollover.effects import EFFECTS
@@ -50,8 +49,8 @@ def rejected_effects(
     if after.total >= held_out(found.base, groups).total:
         return {e.id for e in effects}
     if not in_doubt:
-        left, rivals = float(after.left.sum()), found.first.rivals if found.first is not None else ()
-        better = any(not ends_at_bound(f) and float(held_out(f, groups).left.sum()) < left for f in rivals)
+        chi2, rivals = float(after.chi2.sum()), found.first.rivals if found.first is not None else ()
+        better = any(not is_at_bound(f) and float(held_out(f, groups).chi2.sum()) < chi2 for f in rivals)
         return at_bounds(effects) if better else set()
     null = {e.id for e in effects if may_be_null(e)}
     if len(effects) == 1 and null and is_clear_of_null(problem, found.fitted):
@@ -95,16 +94,20 @@ def null_side(problem: Problem, fitted: Fitted) -> tuple[str, float, bool] | Non
     count = sum(b.residual.size for b in fitted.blocks)
     due = (
         SETTINGS.inference.local_quadratic.normal_quantile**2
-        * max(1.0, fitted.left / count)
+        * max(1.0, fitted.chi2 / count)
         * problem.samples_per_error
     )
     shifts, others = [b.shift for b in fitted.blocks], [v for j, v in enumerate(fitted.x) if j != k]
 
-    def is_met(place: float) -> bool:
+    def is_met(x: float) -> bool:
         there = problem.fit(
-            held_at(fitted, k, place), others, rounds=SETTINGS.inference.intervals.held_rounds, shifts=shifts, width=1
+            held_at(fitted, k, x),
+            others,
+            rounds=SETTINGS.inference.intervals.held_rounds,
+            shifts=shifts,
+            width=1,
         )
-        return there is None or there.left - fitted.left < due
+        return there is None or there.chi2 - fitted.chi2 < due
 
     beyond, inside = min(max(end, 0.0), 1.0), at
     if is_met(beyond):
@@ -135,17 +138,17 @@ def next_best(
     first = found.first
     if first is None:
         return found.refused()
-    start = float(held_out(first.base, groups).left.sum())
-    left = {f.label: float(held_out(f, groups).left.sum()) for f in first.rivals}
-    most = max((start - v for v in left.values()), default=0.0)
+    start = float(held_out(first.base, groups).chi2.sum())
+    chi2 = {f.label: float(held_out(f, groups).chi2.sum()) for f in first.rivals}
+    most = max((start - v for v in chi2.values()), default=0.0)
     able = [
         f
         for f in first.rivals
-        if f.candidates[-1].id not in out and not ends_at_bound(f) and start - left[f.label] > TUNING.rival_share * most
+        if f.candidates[-1].id not in out and not is_at_bound(f) and start - chi2[f.label] > TUNING.rival_share * most
     ]
     if not able:
         return found.refused()
-    one = replace(first, fitted=min(able, key=lambda f: left[f.label])).again(problem)
+    one = replace(first, fitted=min(able, key=lambda f: chi2[f.label])).again(problem)
     one, after = with_conditions_refitted(problem, one, mismatch_of(problem.dataset, one.fitted.blocks, phases), phases)
     return replace(found, parts=(one,), fitted=one.fitted, after=after, first=one)
 

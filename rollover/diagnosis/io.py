@@ -10,13 +10,11 @@ from typing import Any
 
 from rollover.assessment.results import plain, versions
 from rollover.calibration import posterior
-from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.pipeline import diagnose
-from rollover.diagnosis.result import Diagnosis, Draws, Interval, Law, Named, Place, Score
+from rollover.diagnosis.result import Diagnosis, Draws, Interval, Law, Location, Named, Score
 from rollover.effects import nth
 from rollover.recording import Recording
 from rollover.recording.importers import read_named
-from rollover.scenario import Scenario, load
+from rollover.scenario import Scenario
 from rollover.spec.document import dump
 
 FORMAT = "rollover-diagnosis/1"
@@ -46,7 +44,7 @@ def json_of(
             },
             "smallest_detectable": {k: v for k, v in found.smallest_detectable.items() if isfinite(v)},
             "significance": {"p_value": found.p_value, "noise": dict(found.noise)},
-            "where": [_place(p) for p in found.where],
+            "where": [_location(p) for p in found.where],
             "depends_on": found.depends_on,
             "dependencies": [{"on": name, "share": share} for name, share in found.dependencies],
             "degrees_of_freedom": [asdict(d) for d in found.degrees],
@@ -78,8 +76,8 @@ def _posterior(drawn: Draws) -> dict[str, Any]:
     return posterior.summary(drawn.names, drawn.values, drawn.convergence, prior)
 
 
-def _place(place: Place) -> dict[str, Any]:
-    return asdict(place)
+def _location(location: Location) -> dict[str, Any]:
+    return asdict(location)
 
 
 def _effect(effect: Named) -> dict[str, Any]:
@@ -147,15 +145,3 @@ def diagnosed_text(scenario: Scenario, found: Diagnosis) -> str:
 def recordings_in(folder: Path) -> list[tuple[str, Recording]]:
     """Name and recording of each table in a folder, by name. Raises `InputError`."""
     return [(name, recording) for name, (_, recording) in read_named([folder]).items()]
-
-
-def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
-    """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says.
-
-    Those whose names begin with "reference" are references, see `diagnose`.
-    """
-    del out
-    recordings = recordings_in(folder)
-    taught = [name for name, _ in recordings if name.startswith(REFERENCE)]
-    with Executor(workers) as executor:
-        return json_of(diagnose(load(folder / "scenario.yaml"), recordings, reference=taught, executor=executor))

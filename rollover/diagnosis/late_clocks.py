@@ -11,7 +11,7 @@ from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.inference.scores import judged
 from rollover.diagnosis.result import Diagnosis, Interval, Named
-from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, spoken
 
@@ -26,12 +26,12 @@ def with_clock_finding(found: Diagnosis, late: Mapping[str, float], problem: Pro
     clocks = _named(late, problem, tried.p_value)
     rest = f" Beside that: {found.sentence}" if found.effects else ""
     after = {n: a for n, _, a in found.per_recording}
-    left = found.after.get("held_out", found.after["training"]).nrmse
+    end = found.after.get("held_out", found.after["training"]).nrmse
     return replace(
         found,
         verdict=found.verdict if found.effects else "sensor",
         answer=found.answer if found.effects else "whole",
-        sentence=f"{clocks[0].statement} With it the misfit falls from {held:.1f} to {left:.2f} times the noise.{rest}",
+        sentence=f"{clocks[0].statement} With it the misfit falls from {held:.1f} to {end:.2f} times the noise.{rest}",
         p_value=tried.p_value,
         effects=(*clocks, *found.effects),
         before=before.scores,

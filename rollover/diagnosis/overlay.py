@@ -18,10 +18,11 @@ from rollover.diagnosis.data.dataset import Dataset, Signal, dataset_of
 from rollover.diagnosis.data.onset import zeros_from_contact
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import on_attitude_branch, simulated, with_reference_attitude
-from rollover.diagnosis.forward.forward_model import Simulator, simulator_of
+from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.forward.full_run import CENTRE, full_runs, made_ahead
+from rollover.diagnosis.forward.interface import Simulator
 from rollover.diagnosis.io import diagnosed_scenario
 from rollover.diagnosis.noise.ensemble import running_mean
 from rollover.diagnosis.noise.heteroscedasticity import with_variance_model
@@ -85,7 +86,7 @@ class Overlay:
     condition: str = ""
 
 
-def series(
+def overlays_of(
     scenario: Scenario,
     recordings: Sequence[tuple[str, Recording]],
     found: Diagnosis,
@@ -101,13 +102,13 @@ def series(
     for name, recording in zeros_from_contact(scenario, recordings)[0]:
         laid = {CENTRE: found.grids[name]} if name in found.grids else {}
         other = diagnosed.replaced(laid) if found.effects or found.empirical else None
-        one = _told(name, recording, scenario.replaced(laid), other, name in judged, children)
+        one = _overlay_of(name, recording, scenario.replaced(laid), other, name in judged, children)
         if one is not None:
             overlays.append(one)
     return tuple(overlays)
 
 
-def _told(
+def _overlay_of(
     name: str,
     recording: Recording,
     scenario: Scenario,
@@ -205,7 +206,7 @@ def single_sample_noise(residual: Array, sigma: float, many: int) -> float:
 def _shift(dataset: Dataset) -> float:
     """Time shift at which a simulation meets its recording best, within `search_width` of its prior, s."""
     problem = Problem([dataset])
-    align(problem)
+    estimate_time_shifts(problem)
     fitted = problem.fit((), ())
     best = problem.shifts[0] if fitted is None else fitted.blocks[0].shift
     most = SETTINGS.fit.time_shift.search_width * dataset.shift_prior

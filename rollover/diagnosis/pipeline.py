@@ -5,34 +5,38 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from rollover.diagnosis.alone import follows_a_law, repeats_its_course
 from rollover.diagnosis.conclusion import Asked, Conclusion, concluded
+from rollover.diagnosis.data.condition_uncertainty import with_rounding_uncertainty
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import Aside, find_inconsistencies, without_inconsistent
 from rollover.diagnosis.data.onset import clock_notes, with_clock_zeros
-from rollover.diagnosis.data.rounding import with_rounding_uncertainty
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.time_shift import align, clock_outliers, is_explained_by_clocks
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
+from rollover.diagnosis.fit.time_shift import clock_outliers, estimate_time_shifts, is_explained_by_clocks
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference.discrepancy import Discrepancy, estimated, learned_from_references, with_discrepancy
 from rollover.diagnosis.inference.taught_course import taught_by
 from rollover.diagnosis.inference.wrong_condition import wrong_conditions
 from rollover.diagnosis.invariants import checked
+from rollover.diagnosis.io import REFERENCE, json_of, recordings_in
 from rollover.diagnosis.late_clocks import with_clock_finding
 from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis, Estimate
-from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import is_hardly_tolerated
 from rollover.dynamics.drop_test import unfit
 from rollover.recording import Recording
 from rollover.recording.attitude import continuous
-from rollover.scenario import Scenario
+from rollover.scenario import Scenario, load
 from rollover.spec.vehicle import Striker
 
 COMMON = "what {} references have in common was taken off each channel, as far as each of them repeats the others"
@@ -80,7 +84,7 @@ def diagnose(
     if posterior and unfit(scenario):
         raise ValueError("posterior: of drops only, got an overturn; 0 draws, or those of a calibration")
     recordings, zeros = with_clock_zeros(scenario, [(name, continuous(r)) for name, r in recordings])
-    is_drop = isinstance(scenario.vehicle, Striker)  # what little errors do to an overturn is chance, see `chaos`
+    is_drop = isinstance(scenario.vehicle, Striker)  # what small errors do to an overturn is ensemble scatter
     recordings, rounded = with_rounding_uncertainty(recordings) if is_drop else (recordings, [])
     every, notes = prepared(scenario, recordings, executor)
     notes += [*clock_notes(scenario, recordings, zeros), *rounded]
@@ -104,30 +108,31 @@ def diagnose(
         asked = replace(asked, discrepancy=Discrepancy(scales=stated))
     if asked.discrepancy is not None:
         every = with_discrepancy(every, asked.discrepancy)
-    some, shared = find_inconsistencies(every)
-    wrong = wrong_conditions([e for e in without_inconsistent(every, some) if e.name not in hold_out])
+    inconsistent, shared = find_inconsistencies(every)
+    wrong = wrong_conditions([e for e in without_inconsistent(every, inconsistent) if e.name not in hold_out])
     every = [e for e in every if e.name not in {one.dataset.name for one in wrong}]
-    usable = without_inconsistent(every, some)
-    first = concluded(asked, usable, [*some, *wrong], notes)
+    usable = without_inconsistent(every, inconsistent)
+    first = concluded(asked, usable, [*inconsistent, *wrong], notes)
     is_open = estimate == "unexplained" and not (reference or stated or general > 0.0)
-    doubtful = first if is_open and isinstance(first, Conclusion) and first.verdict == "unexplained" else None
-    if doubtful is not None and not shared:
-        # what is said of a residual beside noise alone takes long, and is said only where nothing else is
-        found = _second_opinion(doubtful, usable, notes) or _answered(doubtful, usable, notes)
+    unexplained = first if is_open and isinstance(first, Conclusion) and first.verdict == "unexplained" else None
+    if unexplained is not None and not shared:
+        # a report on an unexplained residual takes long, and is made only where there is no second opinion
+        found = _second_opinion(unexplained, usable, notes) or _answered(unexplained, usable, notes)
     else:
         found = _answered(first, usable, notes)
         if found.verdict == "unexplained" and shared:
-            # beside a factor so large what else is missing may be out of sight
-            other = _diagnosed(asked, without_inconsistent(every, [*some, *shared]), [*some, *shared, *wrong], notes)
+            # a factor that all recordings of a channel share may hide what else is missing: once more without these
+            left_out = [*inconsistent, *shared]
+            other = _diagnosed(asked, without_inconsistent(every, left_out), [*left_out, *wrong], notes)
             found = other if other.effects else found
-        if found.verdict == "unexplained" and doubtful is not None:
-            found = _second_opinion(doubtful, usable, notes) or found
+        if found.verdict == "unexplained" and unexplained is not None:
+            found = _second_opinion(unexplained, usable, notes) or found
     bounds = stated or (dict.fromkeys(channels, general) if general > 0.0 else {})
     is_open = found.verdict == "unexplained" or is_hardly_tolerated(found)
     if estimate and not reference and bounds and is_open and not unfit(scenario):
-        left = {e.name for e in usable}
-        bare = without_inconsistent([e for e in exact if e.name in left], some)
-        found = _within_tolerance(replace(asked, bounds=bounds), bare, [*some, *wrong], notes) or found
+        used = {e.name for e in usable}
+        exact = without_inconsistent([e for e in exact if e.name in used], inconsistent)
+        found = _within_tolerance(replace(asked, bounds=bounds), exact, [*inconsistent, *wrong], notes) or found
     return checked(replace(found, clocks=zeros, seconds=clock.perf_counter() - began))
 
 
@@ -187,7 +192,7 @@ def _answered(found: Conclusion | Diagnosis, every: Sequence[Dataset], notes: Se
 
 def _second_opinion(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]) -> Diagnosis | None:
     """What clocks, or an effect beside a discrepancy, say of recordings that nothing explains beside their noise."""
-    if found.shown is not None:
+    if found.recording_fault is not None:
         return None
     found = replace(found, asked=replace(found.asked, estimates=True))
     return _with_clocks_corrected(found, every, notes) or _beside_estimated_discrepancy(found, every, notes)
@@ -216,8 +221,10 @@ def _beside_estimated_discrepancy(
             )
     if isinstance(other, Diagnosis):
         return None
-    is_told = bool(other.effects) or (other.verdict == "no-mismatch" and learned.is_usual and not _is_reproduced(other))
-    return reported(other) if is_told else None
+    says_more = bool(other.effects) or (
+        other.verdict == "no-mismatch" and learned.is_usual and not _is_reproduced(other)
+    )
+    return reported(other) if says_more else None
 
 
 def _is_reproduced(found: Conclusion) -> bool:
@@ -248,7 +255,7 @@ def _learned_from_references(
     if not usable:
         return others, None
     problem = Problem(weighted_datasets(scenario, usable))
-    align(problem)
+    estimate_time_shifts(problem)
     base = problem.fit((), ())
     if base is None:
         return others, None
@@ -280,3 +287,15 @@ def _with_clocks_corrected(found: Conclusion, every: Sequence[Dataset], notes: S
     if other.verdict in ("unexplained", "cannot-tell"):
         return None
     return with_clock_finding(other, late, problem, found.tried)
+
+
+def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
+    """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says.
+
+    Those whose names begin with "reference" are references, see `diagnose`.
+    """
+    del out
+    recordings = recordings_in(folder)
+    taught = [name for name, _ in recordings if name.startswith(REFERENCE)]
+    with Executor(workers) as executor:
+        return json_of(diagnose(load(folder / "scenario.yaml"), recordings, reference=taught, executor=executor))

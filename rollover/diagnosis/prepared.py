@@ -12,14 +12,15 @@ from rollover.diagnosis.data.repeatability import with_scatter
 from rollover.diagnosis.data.stretches import parted
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import compared
-from rollover.diagnosis.forward.forward_model import Simulator, first_impact_of, set_up
+from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.forward.full_run import full_runs
+from rollover.diagnosis.forward.interface import Simulator, first_impact_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.ensemble import with_sample_weights
 from rollover.diagnosis.noise.heteroscedasticity import with_variance_model
-from rollover.diagnosis.noise.offsets import with_zeros
+from rollover.diagnosis.noise.offsets import with_offsets_removed
 from rollover.diagnosis.noise.truncation import shortened
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -30,7 +31,7 @@ from rollover.system.errors import Fault, InputError
 def prepared(
     scenario: Scenario, recordings: Sequence[tuple[str, Recording]], executor: Executor
 ) -> tuple[list[Dataset], list[str]]:
-    """Recordings as evidence, and what is to be said of them. Raises `InputError` where none of it is simulated."""
+    """Recordings as datasets, and notes on them. Raises `InputError` where none of it is simulated."""
     found, read, notes, foreign = [], [], [], []
     for name, whole in recordings:
         recording, spiked = without_spikes(whole)
@@ -78,12 +79,12 @@ def with_common_noise(scenario: Scenario, every: Sequence[Dataset]) -> list[Data
     """The recordings with the noise of those alike taken together, from their quiet stretches."""
     every = [with_uncertain_conditions(e, set_up(scenario, e.recording)) for e in with_scatter(every)]
     problem = Problem(every)
-    align(problem)
+    estimate_time_shifts(problem)
     base = problem.fit((), (), rounds=2)
     if base is None:
         return list(every)
     residuals, shifts = problem.residuals(base), [b.shift for b in base.blocks]
-    return with_zeros(autoregression.with_noise_of_quiet_stretches(every, residuals), residuals, shifts)
+    return with_offsets_removed(autoregression.with_noise_of_quiet_stretches(every, residuals), residuals, shifts)
 
 
 def weighted_datasets(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.stretches import channel_of
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.inference.discrepancy import MEDIAN, SCALES, SPREAD, residual_rms
-from rollover.diagnosis.selection.decision import Explanation, strongest
+from rollover.diagnosis.selection.explanation import Explanation, strongest
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
@@ -62,7 +63,7 @@ def _beside_noise(problem: Problem, tried: Explanation, found: Explanation) -> I
     base, first = tried.base, tried.first
     count = sum(b.residual.size for b in base.blocks)
     fits = list(first.rivals) if first is not None else []
-    least = min(f.left for f in (base, found.fitted, *fits))
+    least = min(f.chi2 for f in (base, found.fitted, *fits))
     dispersion = max(1.0, least / count)
 
     def evidence(gain: float, numbers: int) -> float:
@@ -70,11 +71,11 @@ def _beside_noise(problem: Problem, tried: Explanation, found: Explanation) -> I
 
     every = [(NOTHING, 0.0)]
     if first is None:  # nothing was fitted: what a look says that it would gain
-        every += [(key.partition(":")[0], evidence(score, 1)) for key, score in tried.looked.scores.items()]
-    every += [(f.candidates[-1].id, evidence(base.left - f.left, len(f.x))) for f in fits]
+        every += [(key.partition(":")[0], evidence(score, 1)) for key, score in tried.scored.scores.items()]
+    every += [(f.candidates[-1].id, evidence(base.chi2 - f.chi2, len(f.x))) for f in fits]
     if len(found.fitted.effects) > 1:
         name = strongest(problem, found.base, found.fitted).id
-        every.append((name, evidence(base.left - found.fitted.left, len(found.fitted.x))))
+        every.append((name, evidence(base.chi2 - found.fitted.chi2, len(found.fitted.x))))
     return every
 
 

@@ -8,32 +8,31 @@ from dataclasses import replace
 
 from rollover.diagnosis.conclusion import Conclusion
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.data.inconsistent import inconsistency_evidence
+from rollover.diagnosis.data.inconsistent import inconsistency_sentences
 from rollover.diagnosis.data.repeatability import contradiction_clause, inconsistent_repeats
+from rollover.diagnosis.fit.cross_validation import HeldOutMisfit
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.time_shift import clock_evidence, clock_outliers
+from rollover.diagnosis.fit.time_shift import clock_offset_sentence, clock_outliers
 from rollover.diagnosis.forward.full_run import full_runs
-from rollover.diagnosis.grades import answer_of, share_of
-from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
-from rollover.diagnosis.inference.chassis import misfit_by_degree_of_freedom
+from rollover.diagnosis.grades import answer_of, is_underpowered, share_of
 from rollover.diagnosis.inference.drop_dependence import Dependence, dependence, dependence_of_one
+from rollover.diagnosis.inference.lack_of_fit import is_enough, is_tolerated
 from rollover.diagnosis.inference.posterior import drawn
 from rollover.diagnosis.inference.residual_law import offered, proposed
 from rollover.diagnosis.inference.scores import judged, misfit_before_impact
-from rollover.diagnosis.inference.vehicle_dependence import dependency
-from rollover.diagnosis.planning.by_fits import next_test
-from rollover.diagnosis.power import is_weak
+from rollover.diagnosis.inference.vehicle_dependence import dependency, misfit_by_degree_of_freedom
+from rollover.diagnosis.planning.next_test import next_test
 from rollover.diagnosis.probabilities import NOTHING, probabilities
-from rollover.diagnosis.result import Degree, Diagnosis, Draws, Named, Share
+from rollover.diagnosis.result import Degree, Diagnosis, Draws, Named, Share, Verdict
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     by_share,
     candidate_table,
     closest_candidate_sentence,
     immaterial_sentence,
+    locations,
     no_contact_clause,
     noise,
-    places,
     sentence,
     step_error_note,
     tolerance_clause,
@@ -44,49 +43,30 @@ from rollover.effects import spoken
 
 def reported(c: Conclusion) -> Diagnosis:
     """A conclusion as it is reported, with what the mismatch depends on."""
-    asked, problem, explanation, shown, verdict, effects = (
-        c.asked,
-        c.problem,
-        c.explanation,
-        c.shown,
-        c.verdict,
-        c.effects,
-    )
-    executor, groups, found, set_ups = asked.executor, c.groups, list(problem.dataset), c.set_ups
+    asked, problem, explanation, recording_fault = c.asked, c.problem, c.explanation, c.recording_fault
+    verdict, effects, groups, found, set_ups = c.verdict, c.effects, c.groups, list(problem.dataset), c.set_ups
     before, after = explanation.before, explanation.after
-    is_mismatch = verdict not in ("no-mismatch", "cannot-tell") and shown is None
+    is_mismatch = verdict not in ("no-mismatch", "cannot-tell") and recording_fault is None
     asked.say("what the mismatch depends on")
-    depends_on = Dependence()
-    degrees: tuple[Degree, ...] = ()
-    if c.acts == "drop" and is_mismatch:
-        depends_on = dependence(problem, set_ups, explanation.base, executor.parallel_map)
-    elif c.acts == "rollover":
-        degrees = misfit_by_degree_of_freedom(set_ups, found, [b.shift for b in explanation.base.blocks])
-        of_one = dependence_of_one(problem, explanation.base, before) if is_mismatch else None
-        of_motion = Dependence(shares=dependency(problem, explanation.base))
-        depends_on = of_motion if of_one is None or of_one.yields_to(of_motion) else of_one
+    depends_on, degrees = _dependence(c, is_mismatch=is_mismatch)
     law = None
-    if verdict == "unexplained" and c.acts == "drop" and shown is None:
+    if verdict == "unexplained" and c.acts == "drop" and recording_fault is None:
         asked.say("a law for the unexplained residual")
         law = proposed(problem, explanation.base, set_ups, found, groups)
-    told_of = {} if asked.discrepancy is None else asked.discrepancy.scales_by_channel(found)
-    shares = {} if asked.discrepancy is None else {k: asked.discrepancy.scales[k] for k in told_of}
+    model_error = {} if asked.discrepancy is None else asked.discrepancy.scales_by_channel(found)
+    shares = {} if asked.discrepancy is None else {k: asked.discrepancy.scales[k] for k in model_error}
     is_taught = asked.discrepancy is not None and asked.discrepancy.is_taught
     detectable = dict(explanation.detectable)
     contrary = inconsistent_repeats(found, SETTINGS.data.repeatability.contradiction)
-    if verdict == "no-mismatch" and not c.slight and (contrary or is_weak(detectable)):
+    if verdict == "no-mismatch" and not c.slight and (contrary or is_underpowered(detectable)):
         verdict = "cannot-tell"
     h_before, h_after = (judged(problem, f, c.validation, groups) for f in (explanation.base, explanation.fitted))
-    early = (
-        misfit_before_impact(problem.dataset, explanation.base),
-        misfit_before_impact(problem.dataset, explanation.fitted),
-    )
     remains = not (c.is_beside and is_tolerated(problem, explanation.fitted)) and not is_enough(
         problem, explanation.fitted, after
     )
-    by_itself = () if shown is None else shown.places
+    by_itself = () if recording_fault is None else recording_fault.locations
     lost = by_itself if verdict == "unexplained" else ()
-    is_left = (verdict == "unexplained" and shown is None) or (bool(effects) and remains)
+    is_left = (verdict == "unexplained" and recording_fault is None) or (bool(effects) and remains)
     training = tuple(e.name for e in found)
     notes = [
         *c.notes,
@@ -94,49 +74,26 @@ def reported(c: Conclusion) -> Diagnosis:
         *step_error_note(effects),
         *_cost(found),
     ]
+    said = _main_sentence(c, verdict, h_before.held, h_after.held, remains=remains, has_model_error=bool(model_error))
+    if verdict == "unexplained" and recording_fault is None:
+        said += closest_candidate_sentence(explanation, groups)
+    if is_left:
+        said += clock_offset_sentence(clock_outliers(problem, explanation.fitted, asked.executor.parallel_map))
+    if recording_fault is None:
+        said += by_share(effects, shares, estimated=c.is_estimated)
+    said += offered(law) + inconsistency_sentences(c.inconsistencies) + contradiction_clause(verdict, contrary)
+    said += tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found, taught=is_taught)
+    said += no_contact_clause(found)
     return Diagnosis(
         verdict=verdict,
-        sentence=(
-            shown.sentence
-            if shown is not None
-            else immaterial_sentence(c.slight)
-            if c.slight
-            else usual_model_error_sentence(
-                asked.discrepancy.scales,
-                explanation.p_value,
-                len(found),
-                _most(c),
-                taught=is_taught,
-            )
-            if verdict == "no-mismatch" and asked.discrepancy is not None and c.is_beside
-            else sentence(
-                verdict,
-                effects,
-                explanation.p_value,
-                h_before.held,
-                h_after.held,
-                found,
-                early,
-                remains=remains,
-                cross_validated=c.is_cross_validated,
-                beside=c.is_beside and bool(told_of),
-            )
-        )
-        + (closest_candidate_sentence(explanation, groups) if verdict == "unexplained" and shown is None else "")
-        + (clock_evidence(clock_outliers(problem, explanation.fitted, executor.parallel_map)) if is_left else "")
-        + (by_share(effects, shares, estimated=c.is_estimated) if shown is None else "")
-        + offered(law)
-        + inconsistency_evidence(c.inconsistencies)
-        + contradiction_clause(verdict, contrary)
-        + tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found, taught=is_taught)
-        + no_contact_clause(found),
-        p_value=explanation.p_value if shown is None else shown.p_value,
+        sentence=said,
+        p_value=explanation.p_value if recording_fault is None else recording_fault.p_value,
         noise=noise(found),
-        where=places(before, found, depends_on.on) if is_mismatch else by_itself,
+        where=locations(before, found, depends_on.on) if is_mismatch else by_itself,
         effects=_with_next_test(c),
         remaining_significant=is_left or bool(lost),
         remaining_p_value=after.p_value,
-        remaining_where=places(after, found, None) if is_left else lost,
+        remaining_where=locations(after, found, None) if is_left else lost,
         depends_on=depends_on.on if is_mismatch else next((p.depends_on for p in lost), None),
         dependencies=depends_on.shares,
         degrees=degrees if is_mismatch else (),
@@ -157,16 +114,62 @@ def reported(c: Conclusion) -> Diagnosis:
         answer=answer_of(
             verdict, c.grade, explanation.p_value, slight=bool(c.slight), is_beside=asked.discrepancy is not None
         ),
-        discrepancy=told_of,
-        by_itself=shown is not None,
+        discrepancy=model_error,
+        by_itself=recording_fault is not None,
         posterior=_draws(c) if effects else None,
         probabilities=_probabilities(c, remains=remains),
     )
 
 
+def _dependence(c: Conclusion, *, is_mismatch: bool) -> tuple[Dependence, tuple[Degree, ...]]:
+    """What the mismatch depends on, and of overturns the degrees of freedom by their share of it."""
+    problem, base = c.problem, c.explanation.base
+    if c.acts == "drop" and is_mismatch:
+        return dependence(problem, c.set_ups, base, c.asked.executor.parallel_map), ()
+    if c.acts != "rollover":
+        return Dependence(), ()
+    degrees = misfit_by_degree_of_freedom(c.set_ups, list(problem.dataset), [b.shift for b in base.blocks])
+    of_one = dependence_of_one(problem, base, c.explanation.before) if is_mismatch else None
+    of_motion = Dependence(shares=dependency(problem, base))
+    return of_motion if of_one is None or of_one.yields_to(of_motion) else of_one, degrees
+
+
+def _main_sentence(
+    c: Conclusion,
+    verdict: Verdict,
+    before: HeldOutMisfit,
+    after: HeldOutMisfit,
+    *,
+    remains: bool,
+    has_model_error: bool,
+) -> str:
+    """The sentence on the verdict; `before` and `after` are the held-out misfits over the noise."""
+    explanation, found, discrepancy = c.explanation, list(c.problem.dataset), c.asked.discrepancy
+    if c.recording_fault is not None:
+        return c.recording_fault.sentence
+    if c.slight:
+        return immaterial_sentence(c.slight)
+    if verdict == "no-mismatch" and discrepancy is not None and c.is_beside:
+        return usual_model_error_sentence(
+            discrepancy.scales, explanation.p_value, len(found), _most(c), taught=discrepancy.is_taught
+        )
+    return sentence(
+        verdict,
+        c.effects,
+        explanation.p_value,
+        before,
+        after,
+        found,
+        (misfit_before_impact(found, explanation.base), misfit_before_impact(found, explanation.fitted)),
+        remains=remains,
+        cross_validated=c.is_cross_validated,
+        beside=c.is_beside and has_model_error,
+    )
+
+
 def _probabilities(c: Conclusion, *, remains: bool) -> dict[str, float]:
     """Of each name; none of full runs, of a model of one's own, and of what recordings show by themselves."""
-    if c.acts != "drop" or c.asked.scenario is None or c.shown is not None:
+    if c.acts != "drop" or c.asked.scenario is None or c.recording_fault is not None:
         return {}
     is_noise = not remains and c.problem.samples_per_error == 1.0
     p_value = c.tried.first.p_value if c.is_beside and c.tried.first is not None else 1.0
@@ -178,7 +181,7 @@ def _probabilities(c: Conclusion, *, remains: bool) -> dict[str, float]:
 
 def _draws(c: Conclusion) -> Draws | None:
     """Draws of what is named, where they were asked for; none of what recordings show by themselves."""
-    if not c.asked.draws or c.shown is not None or c.acts != "drop":
+    if not c.asked.draws or c.recording_fault is not None or c.acts != "drop":
         return None
     c.asked.say("samples of the posterior of the numbers")
     return drawn(c.problem, c.explanation.fitted, c.asked.draws)
@@ -186,13 +189,13 @@ def _draws(c: Conclusion) -> Draws | None:
 
 def _with_next_test(c: Conclusion) -> tuple[Named, ...]:
     """The effects, and where two names are in the set what would choose between them, by their fits."""
-    if c.asked.scenario is None or len(c.effects) != 1 or c.shown is not None or not c.explanation.parts:
+    if c.asked.scenario is None or len(c.effects) != 1 or c.recording_fault is not None or not c.explanation.parts:
         return c.effects
     (effect,), step = c.effects, c.explanation.parts[0]
     rivals = [f for f in step.rivals if f.candidates[-1].id in effect.indistinguishable_from]
     if len(effect.indistinguishable_from) != 1 or not rivals or len(c.explanation.fitted.candidates) != 1:
         return c.effects
-    found = next_test(c.asked.scenario, c.problem.dataset, c.explanation.fitted, min(rivals, key=lambda f: f.left))
+    found = next_test(c.asked.scenario, c.problem.dataset, c.explanation.fitted, min(rivals, key=lambda f: f.chi2))
     return (replace(effect, next_test=found),)
 
 

@@ -22,7 +22,7 @@ Answer = Literal["nothing", "immaterial", "whole", "part", "likeness", "unexplai
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class Location:
     """Where: a recording, channel, phase and interval (s), its share of the misfit, and what it depends on there."""
 
     recording: str
@@ -92,7 +92,7 @@ class NextTest:
     rate: float
     probability: float
 
-    def says(self) -> str:
+    def message(self) -> str:
         """The sentence."""
         value = f"{self.value:g} {self.unit}".rstrip()
         return (
@@ -184,11 +184,11 @@ class Diagnosis:
     sentence: str
     p_value: float
     noise: Mapping[str, float]
-    where: tuple[Place, ...]
+    where: tuple[Location, ...]
     effects: tuple[Named, ...]
     remaining_significant: bool
     remaining_p_value: float
-    remaining_where: tuple[Place, ...]
+    remaining_where: tuple[Location, ...]
     depends_on: str | None
     dependencies: tuple[tuple[str, float], ...]
     smallest_detectable: Mapping[str, float]

@@ -8,21 +8,24 @@ from typing import Any
 import numpy as np
 
 from rollover.comparison.rating import grade
+from rollover.diagnosis.data.condition_uncertainty import pulls
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.cross_validation import Held, held_out
+from rollover.diagnosis.fit.cross_validation import Groups, HeldOutMisfit, held_out
 from rollover.diagnosis.fit.ensemble_mean import refined_by_ensemble_mean
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Groups, Step
+from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
-from rollover.diagnosis.result import Considered, Diagnosis, Named, Place, Score, Share, Verdict
-from rollover.diagnosis.selection.decision import Explanation, strongest
-from rollover.diagnosis.selection.forward_step import confusion
+from rollover.diagnosis.result import Considered, Diagnosis, Location, Named, Score, Share, Verdict
+from rollover.diagnosis.selection.explanation import Explanation, strongest
+from rollover.diagnosis.selection.forward_step import confusion_set
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
 TUNING = SETTINGS.report.statements
+PULLS = SETTINGS.inference.condition_pulls
 
 
 def named(
@@ -30,7 +33,7 @@ def named(
 ) -> tuple[Named, ...]:
     """Effects of an explanation with their intervals and look-alikes, the strongest first.
 
-    `alike` says of a step what cannot be told from its best; by default all that predict no worse (`confusion`).
+    `alike` says of a step what cannot be told from its best; by default all that predict no worse (`confusion_set`).
     Values are those of shorter steps, where runs are integrated: what the scenario's steps take for it is no property
     of what was recorded.
     """
@@ -49,7 +52,7 @@ def named(
         if c.channel is not None:
             values["channel"] = c.channel
         own = by_key[c.key]
-        near = confusion(own, groups, problem.samples_per_error) if alike is None else alike(own)
+        near = confusion_set(own, groups, problem.samples_per_error) if alike is None else alike(own)
         # what was named too is told apart by being beside it
         rivals = [r for r in (f.candidates[-1] for f in near) if r.key not in settings]
         effect = kind(**values)
@@ -115,8 +118,8 @@ def interval_contains_null(effects: Sequence[Named], scattering: bool) -> set[st
 def no_contact_clause(found: Sequence[Dataset]) -> str:
     """What a sentence goes on with where no recording reaches the first contact that is simulated."""
     contacts = [e.simulator.contact for e in found]
-    ends = [max(float(e.recording.time[s.rows[-1]]) for s in e.signals) for e in found]
-    if any(end >= at or not np.isfinite(at) for end, at in zip(ends, contacts, strict=True)):
+    last_times = [max(float(e.recording.time[s.rows[-1]]) for s in e.signals) for e in found]
+    if any(end >= at or not np.isfinite(at) for end, at in zip(last_times, contacts, strict=True)):
         return ""
     return " None of them reaches the first contact: nothing can be said of the ground."
 
@@ -146,8 +149,8 @@ def by_share(effects: Sequence[Named], scales: Mapping[str, float], *, estimated
     for e in found:
         assert e.explains is not None
         share, low, high = (max(v, 0.0) for v in (e.explains.share, e.explains.low, e.explains.high))
-        form = "; in another form, or beside more" if e.answer == "likeness" and scales else ""
-        said += f" {e.id} explains {share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch{form}."
+        nuance = "; in another form, or beside more" if e.answer == "likeness" and scales else ""
+        said += f" {e.id} explains {share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch{nuance}."
     if found and scales:
         how = "estimated" if estimated else "allowed for"
         said += f" A background was {how} beside it (1 sigma, of the range: {background(scales)})."
@@ -241,10 +244,10 @@ def closest_candidate_sentence(found: Explanation, groups: Sequence[Sequence[int
     return f" The closest, {last.id}{of}, leaves {end:.2f} times the noise, with structure in it."
 
 
-def places(mismatch: Mismatch, dataset: Sequence[Dataset], depends: str | None) -> tuple[Place, ...]:
+def locations(mismatch: Mismatch, dataset: Sequence[Dataset], depends: str | None) -> tuple[Location, ...]:
     """Where the misfit is more than noise, largest share first."""
     return tuple(
-        Place(
+        Location(
             recording=dataset[c.recording].name,
             channel=c.channel,
             phase=c.phase,
@@ -293,9 +296,9 @@ def tolerance_clause(
         return ""
     iso, peak = score.iso18571, score.peak_force_error or 0.0
     if iso is not None and grade(iso) == "poor":
-        shown = f"By ISO 18571 they are poor ({iso:.2f})"
+        said = f"By ISO 18571 they are poor ({iso:.2f})"
     elif abs(peak) > max(tolerated):
-        shown = f"A peak force is off by {abs(peak):.0%}"
+        said = f"A peak force is off by {abs(peak):.0%}"
     else:
         return ""
     cure = (
@@ -303,15 +306,15 @@ def tolerance_clause(
         if taught
         else "a smaller --tolerance, or values known better than their stated uncertainty,"
     )
-    return f" {shown}: what is tolerated may hide an effect; {cure} may show it."
+    return f" {said}: what is tolerated may hide an effect; {cure} may show it."
 
 
 def sentence(
     verdict: Verdict,
     effects: Sequence[Named],
     p_value: float,
-    first: Held,
-    last: Held,
+    first: HeldOutMisfit,
+    last: HeldOutMisfit,
     dataset: Sequence[Dataset],
     early: tuple[float | None, float | None] = (None, None),
     *,
@@ -361,3 +364,31 @@ def sentence(
         f"for {without:.1f}"
     )
     return f"{falls} and the scatter of runs; {first_impact}.{also}"
+
+
+def mean_pulls(problem: Problem, fitted: Fitted) -> Mapping[str, float]:
+    """Mean pull of each uncertain number, none of a list, over the recordings that state it, by path.
+
+    In standard deviations of what is stated.
+    """
+    found: dict[str, list[float]] = {}
+    for e, block in zip(problem.dataset, fitted.blocks, strict=True):
+        count = 0 if e.nuisance is None else e.nuisance.shape[1]
+        if not count or count != len(e.doubtful):
+            continue
+        z = pulls(e.uncertain, e.marginalised.undone(block.residual), problem.samples_per_error)
+        for one, pull in zip(e.doubtful, z[:count], strict=True):
+            for path, value in one.items():
+                # numbers of a list have no path of their own, and are left out
+                if isinstance(value, (int, float)):
+                    found.setdefault(path, []).append(float(pull))
+    return {path: float(np.mean(each)) for path, each in found.items()}
+
+
+def pull_notes(problem: Problem, fitted: Fitted) -> list[str]:
+    """A note on what is pulled by a standard deviation and more; none where nothing is."""
+    large = {path: z for path, z in mean_pulls(problem, fitted).items() if abs(z) >= PULLS.least_pull}
+    if not large:
+        return []
+    said = ", ".join(f"{path} by {z:+.1f}" for path, z in large.items())
+    return [f"what is stated as uncertain takes up part of the mismatch: {said} of its standard deviation"]

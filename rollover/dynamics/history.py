@@ -12,12 +12,12 @@ from rollover.dynamics import occupant
 from rollover.dynamics.bodies import Body
 from rollover.dynamics.links import link_channels
 from rollover.dynamics.prescribed import ground_acceleration, quantity, steered_kinetic
-from rollover.inputs import Shake
 from rollover.kernels import tables as c
 from rollover.kernels.tables import OUT_COLUMNS, RESULTANT_COLUMNS, WORKS, Tables
 from rollover.kernels.time_loop import ROWS, Watch
 from rollover.scenario import Scenario
 from rollover.spec.frames import angles, matrices, quaternions
+from rollover.spec.inputs import Shake
 from rollover.spec.rops import Rops
 from rollover.spec.vehicle import Striker, Vehicle
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.dynamics.bodies import Body
-from rollover.inputs import BrakeTorque, DriveTorque, Force, Input, Shake, Signal, Steering, TableAngle
 from rollover.kernels import inputs as k
 from rollover.kernels.stand_devices import D_INPUT, D_KIND, TILT
 from rollover.kernels.tables import P_INERTIA, P_STEERED, W_AXIS, Tables
 from rollover.scenario import Scenario
+from rollover.spec.inputs import BrakeTorque, DriveTorque, Force, Input, Shake, Signal, Steering, TableAngle
 
 Array = NDArray[np.float64]
 

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from rollover.dynamics.bodies import Body, loose
 from rollover.dynamics.prescribed import first_angle
 from rollover.effects.vehicle import TankSlosh
-from rollover.inputs import Steering
 from rollover.kernels import tables as c
 from rollover.kernels import terms
 from rollover.scenario import Scenario
 from rollover.spec.estimates import turning_inertia
 from rollover.spec.initiation import Driving
+from rollover.spec.inputs import Steering
 from rollover.spec.vehicle import RigidBody, Striker, Vehicle, Wheel
 
 Array = NDArray[np.float64]

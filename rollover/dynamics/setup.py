@@ -13,13 +13,13 @@ from rollover.dynamics.bodies import Body, bodies_of
 from rollover.dynamics.equilibrium import Equilibrium
 from rollover.dynamics.placement import Start, place
 from rollover.dynamics.prescribed import first_angle, with_inputs
-from rollover.inputs import TableAngle
 from rollover.kernels import stand_devices as d
 from rollover.kernels.tables import E_FORCE_NOW, Tables
 from rollover.scenario import Scenario
 from rollover.spec.frames import matrices
 from rollover.spec.inertia import MassProperties
 from rollover.spec.initiation import Standing
+from rollover.spec.inputs import TableAngle
 from rollover.spec.stand import DIRECTION, Lashing, PendulumBlow, StaticTest, TiltTable
 from rollover.spec.vehicle import Vehicle
 from rollover.system.errors import Fault, InputError

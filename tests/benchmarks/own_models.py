@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from rollover.diagnosis import Diagnosis
 from rollover.diagnosis.own_model import diagnose_model, load_model
-from rollover.diagnosis.own_model.files import found_at
+from rollover.diagnosis.own_model.declaration import found_at
 from tests.own_model.recorded import World
 from tests.own_model.worlds import KINDS, WORLDS, drawn
 

@@ -14,12 +14,13 @@ import numpy as np
 from scipy.stats import binomtest
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.planning.plan import usual_noise
 from rollover.diagnosis.planning.planned import Instruments, planned, showing
 from rollover.diagnosis.planning.separation import Tests
-from rollover.diagnosis.planning.strength import place_where_it_acts, strength_with
+from rollover.diagnosis.planning.strength import point_where_it_acts, strength_with
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, scenario
 
@@ -77,7 +78,7 @@ def chosen_rightly(
 
 def misfit(fitted: Fitted) -> float:
     """What a fit leaves; samples about its own leaps, which count nothing there, by what noise leaves of each: 1."""
-    return fitted.left + sum(np.count_nonzero(b.residual == 0.0) for b in fitted.blocks)
+    return fitted.chi2 + sum(np.count_nonzero(b.residual == 0.0) for b in fitted.blocks)
 
 
 def main() -> None:
@@ -96,7 +97,7 @@ def main() -> None:
         def shows(x: tuple[float, ...], one: Candidate = one) -> float:
             return tests.unexplained(one, x)
 
-        place = place_where_it_acts(one, shows)
+        place = point_where_it_acts(one, shows)
         x = None if place is None else strength_with(one, place, shows, strength)
         promised = None if x is None else tests.apart(one, x, rival)
         if x is None or promised is None:

@@ -25,7 +25,7 @@ from rollover.diagnosis import Diagnosis, diagnose
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference.weak_form import Balance, balances
@@ -104,7 +104,7 @@ def gains(problem: Problem, every: list[Balance], method: Method) -> tuple[float
         for k, b in enumerate(every):
             if b.condition == condition:
                 squares[1] += np.sum(b.force**2), np.sum((b.force - means[k] @ c) ** 2)
-        for r, e in enumerate(problem.evidence):
+        for r, e in enumerate(problem.dataset):
             if (e.condition or e.name) == condition:
                 without = problem.clocked(r, (), (), problem.shifts[r], ROUNDS)
                 beside = problem.clocked(r, (law,), (), problem.shifts[r], ROUNDS)
@@ -138,7 +138,7 @@ def test_a_diagnosis_beside_pysindy_and_a_polynomial(kind: str, effect: str) -> 
     forces = balances([set_up(scenario, e.recording) for e in kept], kept)
     assert len(forces) > 2  # a way down that is too short for windows has none
     problem = Problem(kept)
-    align(problem)
+    estimate_time_shifts(problem)
     gain, says = told(found)
     rows = [("diagnose", gain, np.nan, says, 1.0)]
     for name, method in (("pysindy", by_sindy), ("polynomial", by_squares)):

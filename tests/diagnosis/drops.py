@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rollover.diagnosis.data.dataset import Signal
-from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Recording
 from rollover.scenario import Scenario

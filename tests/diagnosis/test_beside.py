@@ -16,7 +16,7 @@ from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.result import Share
-from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.selection.forward_step import by_chance
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.statements import usual_model_error_sentence
@@ -67,7 +67,7 @@ def explanation(base: Sequence[float], best: Fitted, *rivals: Fitted, p_value: f
     one = Step(base=nothing(base), fitted=best, p_value=p_value, rivals=(best, *rivals))
     empty: Any = None
     return Explanation(
-        base=one.base, fitted=best, parts=(one,), looked=empty, detectable={}, before=empty, after=empty, first=one
+        base=one.base, fitted=best, parts=(one,), scored=empty, detectable={}, before=empty, after=empty, first=one
     )
 
 
@@ -121,11 +121,11 @@ def test_a_gain_is_one_draw_however_many_recordings_repeat_it() -> None:
     """Of errors that come anew 240 samples of six drops tell 24, of those that a rig repeats 4."""
     base, best = nothing((2.0,) * DROPS), fitted("soil-layer", (1.0,) * DROPS)
     rng = np.random.default_rng(1)
-    looked = ScoreTest(score=0.0, scores={}, null=np.sort(rng.chisquare(1, (2000, 20)).max(axis=1)), detectable={})
-    anew, repeated = (by_chance(base, [best], looked, shared) for shared in (10.0, 10.0 * DROPS))
+    scored = ScoreTest(score=0.0, scores={}, null=np.sort(rng.chisquare(1, (2000, 20)).max(axis=1)), detectable={})
+    anew, repeated = (by_chance(base, [best], scored, shared) for shared in (10.0, 10.0 * DROPS))
     assert anew < 1e-3
     assert repeated > 0.3
-    assert by_chance(base, [fitted("soil-layer", (1.9,) * DROPS)], looked, 10.0) > anew
+    assert by_chance(base, [fitted("soil-layer", (1.9,) * DROPS)], scored, 10.0) > anew
 
 
 SURELY, MAYBE = (0.20, 0.22, 0.19, 0.21, 0.20, 0.18), (0.10, 0.50, 0.15, 0.45, 0.05, 0.30)

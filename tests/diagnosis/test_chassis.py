@@ -7,7 +7,7 @@ import pytest
 
 from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.forward.full_run import RunSimulator
-from rollover.diagnosis.inference.chassis import misfit_by_degree_of_freedom
+from rollover.diagnosis.inference.vehicle_dependence import misfit_by_degree_of_freedom
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 from rollover.spec.vehicle import chassis_of

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.diagnosis import diagnose, json_of, power
+from rollover.diagnosis import diagnose, grades, json_of
 from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
 
@@ -110,7 +110,7 @@ def test_recordings_that_contradict_each_other_are_not_explained() -> None:
 
 
 @pytest.mark.parametrize(
-    ("detectable", "is_weak"),
+    ("detectable", "is_underpowered"),
     [
         (
             {"payload-shift": 400.0, "tank-slosh": 400.0, "mount-play": 1e-5},
@@ -122,8 +122,10 @@ def test_recordings_that_contradict_each_other_are_not_explained() -> None:
         ({"rops-plasticity": 1.0, "mass": 1.0}, True),  # of a limit, and of a value, nothing is usual
     ],
 )
-def test_recordings_that_show_no_usual_strength_are_too_weak(detectable: dict[str, float], is_weak: bool) -> None:
-    assert power.is_weak(detectable) is is_weak
+def test_recordings_that_show_no_usual_strength_are_too_weak(
+    detectable: dict[str, float], is_underpowered: bool
+) -> None:
+    assert grades.is_underpowered(detectable) is is_underpowered
 
 
 def test_millimetres_stated_as_metres_are_a_channels_scale() -> None:

@@ -11,9 +11,10 @@ import pytest
 
 from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.data.phases import drop_phases
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference import drop_dependence as dependence_of
@@ -48,7 +49,7 @@ def base_of(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple
     found = [dataset_of(name, *simulated(own, r)) for name, r in recordings]
     dataset: list[Dataset] = [e for e in found if e is not None]
     problem = Problem(dataset)
-    align(problem)
+    estimate_time_shifts(problem)
     first = problem.fit((), (), rounds=2)
     assert first is not None
     problem.with_noise_model(autoregression.with_noise_of_quiet_stretches(dataset, problem.residuals(first)))
@@ -264,7 +265,7 @@ def test_three_effects_of_one_kind_are_over_flexible_two_not() -> None:
     assert not is_over_flexible([*soil[:2], back[0]])
     shaped = replace(soil[1], search={"per_decade": Search(0.01, 0.5), "reference_speed": Search(0.01, 1.0)})
     assert not is_over_flexible([soil[0], shaped])
-    bent = [replace(soil[0], form={"onset": 1.0}), shaped]
+    bent = [replace(soil[0], variant={"onset": 1.0}), shaped]
     assert is_over_flexible(bent)
     assert is_over_flexible([*bent, on("sensor-clipping", drops.FORCE)])
     assert not is_over_flexible([shaped])

@@ -12,10 +12,9 @@ from rollover.diagnosis import diagnose, json_of
 from rollover.diagnosis.alone import repeats_its_course
 from rollover.diagnosis.data.dataset import Dataset, dataset_of, left_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.grades import jackknifed
-from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.discrepancy import (
     MEDIAN,
     SPREAD,
@@ -27,7 +26,7 @@ from rollover.diagnosis.inference.discrepancy import (
     residual_rms,
     with_discrepancy,
 )
-from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import is_tolerated, mismatch_of
 from rollover.diagnosis.inference.repeated_course import predicted_by_others, quick_channels
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.settings import SETTINGS
@@ -62,7 +61,7 @@ def judged(
         found.append(one)
     found = with_discrepancy(found, Discrepancy(scales=shares, times=times or {})) if shares is not None else found
     problem = Problem(found)
-    align(problem)
+    estimate_time_shifts(problem)
     base = problem.fit((), ())
     assert base is not None
     problem.with_noise_model(autoregression.with_noise_of_quiet_stretches(problem.dataset, problem.residuals(base)))

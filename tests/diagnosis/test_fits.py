@@ -16,9 +16,11 @@ import pytest
 from rollover.diagnosis import diagnose, diagnosed_text
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.fit import levenberg_marquardt
-from rollover.diagnosis.fit.jobs import Executor, Task, work
-from rollover.diagnosis.fit.levenberg_marquardt import Problem, ResidualBlock, time_shift_step
+from rollover.diagnosis.fit.jobs import Executor, work
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import ResidualBlock, time_shift_step
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.discontinuities import largest_jump_nearby
 from rollover.diagnosis.selection.candidates import candidates_of
@@ -139,7 +141,7 @@ def test_a_first_fit_ends_alike_with_and_without_jacobian() -> None:
     assert a is not None
     assert b is not None
     assert (b.x, [one.shift for one in b.blocks]) == (a.x, [one.shift for one in a.blocks])
-    assert b.left == a.left
+    assert b.chi2 == a.chi2
     assert all(np.any(one.J) for one in a.blocks)
     assert not any(np.any(one.J) for one in b.blocks)
     assert first.simulations <= whole.simulations - 2 * len(recordings)
@@ -176,7 +178,7 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
         assert a is not None
         assert b is not None
         assert a.x == b.x
-        assert a.left == b.left
+        assert a.chi2 == b.chi2
 
 
 def test_what_was_fitted_is_taken_up_again(tmp_path: Path) -> None:
@@ -194,7 +196,7 @@ def test_what_was_fitted_is_taken_up_again(tmp_path: Path) -> None:
     assert first is not None
     assert again is not None
     assert again.x == first.x
-    assert again.left == pytest.approx(first.left, rel=1e-12)
+    assert again.chi2 == pytest.approx(first.chi2, rel=1e-12)
     assert other.simulations < problem.simulations
     assert Executor(notebook=notebook, about="another scenario")._done.keys() == other_crew._done.keys()
     assert task.key("another") not in other_crew._done
@@ -282,8 +284,8 @@ def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> 
     rate = candidate(problem, "soil-rate-hardening")
     begun = problem.fit((rate,), (0.5,))
     assert begun is not None
-    shifts, form = tuple(b.shift for b in begun.blocks), rate.forms()[0]
-    task = Task(how="shape", candidates=(rate,), start=begun.x, shifts=shifts, form=form)
+    shifts, variant = tuple(b.shift for b in begun.blocks), rate.variants()[0]
+    task = Task(how="shape", candidates=(rate,), start=begun.x, shifts=shifts, variant=variant)
     found = []
     for _ in range(2):
         with Executor(notebook=tmp_path / "notes") as one:
@@ -293,7 +295,7 @@ def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> 
     first, again = found
     assert first is not None
     assert again is not None
-    assert first.candidates[-1].form["per_decade"] == 0.0
+    assert first.candidates[-1].variant["per_decade"] == 0.0
     assert again.candidates[-1] == first.candidates[-1]
     assert again.x == pytest.approx(first.x, rel=1e-12)
     assert made < 20
@@ -313,7 +315,7 @@ def test_far_from_noise_a_fit_stops_at_a_small_gain(monkeypatch: pytest.MonkeyPa
             own = problem.no_jacobian()
             found = own.fit((candidate(problem, key),), start)
             assert found is not None
-            ends[key, trifling] = found.x, found.left, own.simulations
+            ends[key, trifling] = found.x, found.chi2, own.simulations
     (x, left, made), (y, more, fewer) = (
         ends["soil-rate-hardening", t] for t in (0.0, SETTINGS.fit.levenberg_marquardt.converged_share)
     )
@@ -371,5 +373,5 @@ def test_a_rebound_is_searched_from_the_laws_own_restitution() -> None:
     c = next(c for c in candidates_of(problem.dataset, (), "drop", scenario()) if c.key == "soil-elastic-rebound")
     assert c.search["recovery"].low == own > 0.0
     fits = [f for start in c.starts()[:8] if (f := problem.fit((c,), start)) is not None]  # the lowest it may be
-    best = min(fits, key=lambda f: f.left)
+    best = min(fits, key=lambda f: f.chi2)
     assert c.values(best.x)["recovery"] == pytest.approx(0.0222, rel=0.02)

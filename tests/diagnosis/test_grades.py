@@ -14,7 +14,7 @@ from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.grades import answer_of, graded, is_load, jackknifed
 from rollover.diagnosis.invariants import at_bounds, checked, is_noise_alone
-from rollover.diagnosis.result import Diagnosis, Interval, Named, Place, Score, Share
+from rollover.diagnosis.result import Diagnosis, Interval, Location, Named, Score, Share
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 from tests.physics.scenes import shipped
@@ -131,7 +131,9 @@ def test_what_breaks_an_invariant_is_said_by_name(changed: dict[str, Any], broke
 
 
 def test_unexplained_is_more_than_noise_or_shown_by_recordings() -> None:
-    place = Place(recording="a", channel=FORCE, phase="all", start=0.0, end=0.3, share=1.0, depends_on="coarse steps")
+    place = Location(
+        recording="a", channel=FORCE, phase="all", start=0.0, end=0.3, share=1.0, depends_on="coarse steps"
+    )
     for nrmse, by_itself, holds in ((1.0, False, False), (1.0, True, True), (1.3, False, True)):
         score = Score(nrmse=nrmse, iso18571=None, peak_force_error=None)
         found = replace(nothing_found(), verdict="unexplained", where=(place,), before={"held_out": score})

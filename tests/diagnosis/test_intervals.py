@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.data.quantisation import with_quantisation
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import ResidualBlock
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.inference import intervals as stated
 from rollover.diagnosis.settings import SETTINGS
@@ -22,7 +22,7 @@ from rollover.proof.generator import make, plan
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
-from tests.diagnosis.test_refine import judge_of_case
+from tests.diagnosis.test_local_search import judge_of_case
 from tests.diagnosis.test_slopes import CHANNEL, LOAD, Late, dataset, first_impact
 
 
@@ -37,9 +37,9 @@ def test_an_unfitted_exponent_widens_the_strengths_interval() -> None:
     changes = {"effects.soil-viscous-damping.damping": 60.0, "effects.soil-viscous-damping.exponent": 0.9}
     problem = judge_of(recorded(changes, speeds=(1.0, 1.5, 2.0), noise=0.01))
     c = candidate(problem, "soil-viscous-damping")
-    assert set(c.shapes) == {"exponent"}
+    assert set(c.secondary) == {"exponent"}
     fitted = fit(problem, c)
-    no_jacobian = replace(fitted, candidates=(replace(c, shapes={}),))
+    no_jacobian = replace(fitted, candidates=(replace(c, secondary={}),))
     wide, narrow = (stated.intervals(problem, f)[0]["damping"] for f in (fitted, no_jacobian))
     assert wide.low <= 60.0 <= wide.high
     assert wide.high - wide.low > 1.5 * (narrow.high - narrow.low)
@@ -70,9 +70,9 @@ def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float) -> N
     fitted = Fitted(candidates=(candidate,), x=(0.5,), blocks=(block(0, None, [0.5], 0.0, 0.0),))
     found = stated.profile_extents(problem, fitted, np.array([1.0 / J]), 1.0)
     assert found == pytest.approx(np.full((1, 2), flatter), rel=1e-12)  # rounding: the misfit is a parabola
-    for sides, looked in (({0: (1.0,)}, (0.0, 1.0)), ({0: (-1.0,)}, (1.0, 0.0)), ({}, (0.0, 0.0))):
+    for sides, scored in (({0: (1.0,)}, (0.0, 1.0)), ({0: (-1.0,)}, (1.0, 0.0)), ({}, (0.0, 0.0))):
         found = stated.profile_extents(problem, fitted, np.array([1.0 / J]), 1.0, sides)
-        assert found == pytest.approx(1.0 + (flatter - 1.0) * np.array([looked]), rel=1e-12)
+        assert found == pytest.approx(1.0 + (flatter - 1.0) * np.array([scored]), rel=1e-12)
 
 
 @pytest.mark.parametrize(("start", "places"), [(0.5, 8), (0.08, 7)])
@@ -166,7 +166,7 @@ def test_an_interval_follows_a_crooked_valley(profile_extents: float, begun: flo
     def fit(candidates: list[Candidate], x: list[float], **_: Any) -> Any:
         at = candidates[0].fixed["stiffness"]
         held_at.append((at, x))
-        return SimpleNamespace(left=100.0 + due * ((at - 0.5) / (0.04 * profile_extents)) ** 2, x=(0.1,), blocks=())
+        return SimpleNamespace(chi2=100.0 + due * ((at - 0.5) / (0.04 * profile_extents)) ** 2, x=(0.1,), blocks=())
 
     c = Candidate(id="a", kind="physics", family="", search={"stiffness": Search(0, 1), "nose_share": Search(0, 1)})
     fitted: Any = SimpleNamespace(candidates=(c,), x=(0.5, 0.2), blocks=())
@@ -279,7 +279,7 @@ def test_without_slopes_an_interval_ends_by_the_misfit() -> None:
         assert x == [0.2], "the other one is free"
         assert [list(c.search) for c in candidates] == [["b"], []]
         asked.append(candidates[1].fixed["a"])
-        return SimpleNamespace(left=1000.0 if asked[-1] < 0.3 else 5.0)
+        return SimpleNamespace(chi2=1000.0 if asked[-1] < 0.3 else 5.0)
 
     other = Candidate(id="mass", kind="parameter", family="", search={"b": Search(0, 1)})
     pull = Candidate(id="soil-adhesion", kind="physics", family="", search={"a": Search(0, 1)})

@@ -14,7 +14,8 @@ from scipy.stats import kstest
 from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.data.phases import drop_phases
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.forward.forward_model import Simulator, simulator_of
+from rollover.diagnosis.forward.forward_model import simulator_of
+from rollover.diagnosis.forward.interface import Simulator
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.selection.candidates import candidates_of

@@ -17,8 +17,7 @@ from rollover.diagnosis.fit.ensemble_mean import ensemble_mean_misfit, with_ense
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.forward import full_run
 from rollover.diagnosis.forward.forward_model import DropSimulator, simulator_of
-from rollover.diagnosis.forward.full_run import RunSimulator
-from rollover.diagnosis.forward.run_phases import phases_of
+from rollover.diagnosis.forward.full_run import RunSimulator, run_phases
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics import simulate
 from rollover.recording import Clock, Recording, Sensor
@@ -180,7 +179,7 @@ def test_phases_of_an_overturn_are_those_of_its_forces() -> None:
         {"initiation.excess_deg": 8.0, "initiation.roll_rate": 1.8, "simulation.duration": 0.8}
     )
     done = simulate.run(own)
-    marks = {name: at for at, name in phases_of(done)}
+    marks = {name: at for at, name in run_phases(done)}
     assert list(marks) == ["tipping", "impact", "sliding"]
     time, force = done.recording.time, done.recording["ground/force_normal"]
     weight = 3000.0 * 9.81

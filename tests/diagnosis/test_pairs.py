@@ -11,12 +11,12 @@ import pytest
 
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
-from rollover.diagnosis.fit.step import Screened, Step
+from rollover.diagnosis.fit.step import Inquiry, Screened, Step
 from rollover.diagnosis.fit.threshold_scan import has_threshold, threshold_starts
 from rollover.diagnosis.selection import pairs
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
@@ -26,10 +26,10 @@ from tests.diagnosis.test_fits import candidate, judge_of
 RATIO = Search(0.2, 5.0, "log")
 MASS = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
 DAMPING = Candidate(id="soil-viscous-damping", kind="physics", family="", search={"damping": Search(1, 2)})
-PROPORTION = replace(DAMPING, search={"proportion": Search(0, 1)}, form={"damping": 0.0})
+PROPORTION = replace(DAMPING, search={"proportion": Search(0, 1)}, variant={"damping": 0.0})
 NOSE = Candidate(
     id="structural-compliance", kind="physics", family="",
-    search={"stiffness": Search(1, 2), "damping": Search(1, 2)}, shapes={"nose_share": Search(0.1, 0.9)},
+    search={"stiffness": Search(1, 2), "damping": Search(1, 2)}, secondary={"nose_share": Search(0.1, 0.9)},
 )  # fmt: skip
 
 
@@ -43,7 +43,7 @@ def fitted(candidates: tuple[Candidate, ...], times: float) -> Fitted:
 
 
 def screened(c: Candidate) -> Screened:
-    return Screened(candidate=c, starts=((0.3,),), left=1.0, potential=1.0)
+    return Screened(candidate=c, starts=((0.3,),), chi2=1.0, potential=1.0)
 
 
 def inquiry(asked: list[Any]) -> Inquiry:
@@ -63,9 +63,9 @@ def test_a_lone_variant_is_tried_in_its_usual_form_in_pairs() -> None:
         base=fitted((), 30.0), fitted=alone, p_value=0.0, rivals=(alone, fitted((MASS,), 4.0)),
         screened=(screened(DAMPING), screened(MASS)),
     )  # fmt: skip
-    looked = ScoreTest(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
-    found = pairs._partners(inquiry([]), first, (), looked, SETTINGS.selection.pairs.scored)
-    assert [(c.id, c.form, x) for c, x in found] == [
+    scored = ScoreTest(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
+    found = pairs._partners(inquiry([]), first, (), scored, SETTINGS.selection.pairs.scored)
+    assert [(c.id, c.variant, x) for c, x in found] == [
         ("soil-viscous-damping", {"damping": 0.0}, (0.5,)),
         ("mass", {}, (0.5,)),
         ("soil-viscous-damping", {}, (0.3,)),
@@ -79,9 +79,9 @@ def test_a_trailing_variant_is_tried_in_its_usual_form_too() -> None:
         base=fitted((), 30.0), fitted=lead, p_value=0.0, rivals=(lead, bent),
         screened=(screened(DAMPING), screened(MASS)),
     )  # fmt: skip
-    looked = ScoreTest(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
-    found = pairs._partners(inquiry([]), first, (), looked, SETTINGS.selection.pairs.scored)
-    assert [(c.id, c.form) for c, _ in found] == [
+    scored = ScoreTest(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
+    found = pairs._partners(inquiry([]), first, (), scored, SETTINGS.selection.pairs.scored)
+    assert [(c.id, c.variant) for c, _ in found] == [
         ("mass", {}),
         ("soil-viscous-damping", {"damping": 0.0}),
         ("soil-viscous-damping", {}),
@@ -91,7 +91,7 @@ def test_a_trailing_variant_is_tried_in_its_usual_form_too() -> None:
 def test_all_oscillatory_pairs_are_fitted_with_their_share() -> None:
     """With a wrong share of the nose the wrong other effect may lead, as a mass before an impact speed."""
     asked: list[Any] = []
-    bent = replace(MASS, id="soil-adhesion", shapes={"reach": Search(1, 2)})
+    bent = replace(MASS, id="soil-adhesion", secondary={"reach": Search(1, 2)})
     whole = [
         fitted((NOSE, MASS), 30.0),
         fitted((DAMPING, NOSE), 20.0),
@@ -161,7 +161,7 @@ LAYER, CRUST = (
     for name, at in (("layer", "depth"), ("crust", "thickness"))
 )
 BENT = replace(CRUST, search={**CRUST.search, "width": Search(0.001, 0.1, "log")})
-OF_ITS_OWN = replace(LAYER, search={"depth": Search(0.01, 1, "log"), "stiffness": Search(1, 9)}, form={"onset": 1.0})
+OF_ITS_OWN = replace(LAYER, search={"depth": Search(0.01, 1, "log"), "stiffness": Search(1, 9)}, variant={"onset": 1.0})
 
 
 @pytest.mark.parametrize(
@@ -225,8 +225,8 @@ def test_a_threshold_starts_where_it_helps_beside_the_other(ratio: float, lost: 
     assert led[0] is not None
     assert led[1] is not None
     count = sum(b.residual.size for b in led[0].blocks)
-    assert led[0].left < 1.1 * count
-    assert led[1].left > lost * count
+    assert led[0].chi2 < 1.1 * count
+    assert led[1].chi2 > lost * count
 
 
 def test_the_scan_point_of_least_misfit_beside_it_is_taken() -> None:
@@ -249,7 +249,7 @@ def test_what_sets_in_somewhere_says_how_strong_it_is_and_where() -> None:
 def test_leaders_and_thresholds_are_scanned_in_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
     search = {"depth": Search(0.01, 1.0, "log"), "stiffness_ratio": Search(0.2, 5.0, "log")}
     layer = Candidate(id="soil-layer", kind="physics", family="", search=search)
-    bent = replace(layer, id="soil-crust", form={"a": 1.0})
+    bent = replace(layer, id="soil-crust", variant={"a": 1.0})
     partners = [(MASS, (0.1,)), (DAMPING, (0.2,)), (layer, (0.3, 0.4)), (bent, (0.5, 0.6)), (PROPORTION, (0.7,))]
     tried: list[Any] = []
 
@@ -279,23 +279,23 @@ def test_a_pair_of_which_one_is_placed_beside_the_other() -> None:
     assert base is not None
     alone = [problem.fit((c,), x, shifts=[0.0] * 3) for c, x in ((stiffer, (0.5,)), (rate, (0.6,)))]
     led = [f for f in alone if f is not None]
-    lost = Screened(candidate=layer, starts=((0.05, 0.9),), left=9.0, potential=0.0)
+    lost = Screened(candidate=layer, starts=((0.05, 0.9),), chi2=9.0, potential=0.0)
     first = Step(base=base, fitted=led[0], p_value=0.0, rivals=tuple(led), screened=(lost,))
-    looked = ScoreTest(score=9.0, scores={"soil-layer": 9.0}, null=np.zeros(9), detectable={})
+    scored = ScoreTest(score=9.0, scores={"soil-layer": 9.0}, null=np.zeros(9), detectable={})
     asking = Inquiry(
         problem=problem, candidates=[rate, layer, stiffer], groups=[], phases=[phases_of(e) for e in problem.dataset],
         say=lambda _: None, executor=Executor(),
     )  # fmt: skip
-    best = pairs.best_pair(asking, [first], looked)
+    best = pairs.best_pair(asking, [first], scored)
     assert best is not None
     assert best.fitted.label == "soil-rate-hardening + soil-layer"
-    assert best.fitted.left < 1.1 * sum(b.residual.size for b in best.fitted.blocks)
+    assert best.fitted.chi2 < 1.1 * sum(b.residual.size for b in best.fitted.blocks)
     assert layer.values(best.fitted.own)["depth"] == pytest.approx(DEPTH, rel=0.05)
 
 
 GRADUAL = (
-    Candidate(id="soil-layer", kind="physics", family="", search={"depth": Search(0, 1)}, form={"onset": 1.0}),
-    Candidate(id="soil-crust", kind="physics", family="", search={"thickness": Search(0, 1)}, form={"onset": 1.0}),
+    Candidate(id="soil-layer", kind="physics", family="", search={"depth": Search(0, 1)}, variant={"onset": 1.0}),
+    Candidate(id="soil-crust", kind="physics", family="", search={"thickness": Search(0, 1)}, variant={"onset": 1.0}),
 )
 
 

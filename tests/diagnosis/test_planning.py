@@ -16,12 +16,12 @@ from rollover.diagnosis.data.whitening import Whitening
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinates
-from rollover.diagnosis.planning import chances
-from rollover.diagnosis.planning.by_fits import next_test
+from rollover.diagnosis.planning import strength as chances
+from rollover.diagnosis.planning.next_test import next_test
 from rollover.diagnosis.planning.plan import plan, usual_noise
-from rollover.diagnosis.planning.planned import Instruments, coloured, only, planned, showing
+from rollover.diagnosis.planning.planned import Instruments, autoregressive, only, planned, showing
 from rollover.diagnosis.planning.separation import Tests as PlannedTests
-from rollover.diagnosis.planning.strength import place_where_it_acts, strength_with
+from rollover.diagnosis.planning.strength import point_where_it_acts, strength_with
 from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from rollover.diagnosis.settings import SETTINGS
@@ -87,7 +87,7 @@ def test_probabilities_in_closed_form() -> None:
     # one number: the normal test to both sides
     quantile = norm.isf(0.025)
     assert chances.detection(4.0, 0.05) == pytest.approx(norm.sf(quantile - 2.0) + norm.cdf(-quantile - 2.0), rel=1e-9)
-    assert chances.needed(0.9, 0.05) == pytest.approx(10.507, abs=1e-3)
+    assert chances.required_noncentrality(0.9, 0.05) == pytest.approx(10.507, abs=1e-3)
     assert chances.of_one(0.05, 10) == pytest.approx(1.0 - 0.95**0.1, rel=1e-12)
 
 
@@ -118,7 +118,7 @@ def test_the_least_strength_shows_as_often_as_asked_for() -> None:
     def shows(x: tuple[float, ...]) -> float:
         return tests.unexplained(MASS, x)
 
-    place = place_where_it_acts(MASS, shows)
+    place = point_where_it_acts(MASS, shows)
     assert place is not None
     found = strength_with(MASS, place, shows, 10.507)
     assert found is not None
@@ -165,7 +165,7 @@ def test_noise_beside_a_discrepancy_is_whitened() -> None:
     drift = lfilter([miss * math.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(n))
     signal = Signal(
         channel=FORCE, rows=np.arange(n), values=np.zeros(n), sigma=math.hypot(white, miss), noise=white,
-        ar=coloured(white, miss, memory, SETTINGS.planning.order), span=1.0,
+        ar=autoregressive(white, miss, memory, SETTINGS.planning.order), span=1.0,
     )  # fmt: skip
     w = Whitening([signal.spread])(drift + white * rng.standard_normal(n))[SETTINGS.planning.order :]
     assert np.std(w) == pytest.approx(1.0, abs=0.02)
@@ -182,7 +182,7 @@ def test_a_promise_is_kept_in_simulated_campaigns() -> None:
     def shows(x: tuple[float, ...]) -> float:
         return tests.unexplained(a, x)
 
-    place = place_where_it_acts(a, shows)
+    place = point_where_it_acts(a, shows)
     assert place is not None
     x = strength_with(a, place, shows, 45.0)
     assert x is not None
@@ -261,7 +261,7 @@ def test_a_diagnosis_asks_for_the_drop_where_its_fits_differ() -> None:
     assert found.probability > 0.9
     assert found.channels == (FORCE, DEPTH)
     assert found.rate == pytest.approx(300.0)
-    assert found.says().endswith(f"would tell them apart with {found.probability:.0%}")
+    assert found.message().endswith(f"would tell them apart with {found.probability:.0%}")
     loud = [replace(e, signals=tuple(replace(s, noise=10.0 * s.noise) for s in e.signals)) for e in dataset]
     less = next_test(scenario(), loud, one, other)
     assert less is not None
@@ -274,11 +274,11 @@ def test_a_rival_is_refitted_to_the_end() -> None:
     known = effects_of(dataset)
     a, b = known["guide-friction"], known[DAMPING]
     tests = PlannedTests(dataset)
-    place = place_where_it_acts(a, lambda x: tests.unexplained(a, x))
+    place = point_where_it_acts(a, lambda x: tests.unexplained(a, x))
     assert place is not None
     x = strength_with(a, place, lambda x: tests.unexplained(a, x), 12.0)
     assert x is not None
-    found, shown = tests.apart(a, x, b), tests.shown(a, x)
+    found, shown = tests.apart(a, x, b), tests.recorded(a, x)
     assert found is not None
     assert shown is not None
     for start in (found.x, (0.02,), (0.03,), (0.1,)):

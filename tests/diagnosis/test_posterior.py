@@ -18,10 +18,10 @@ from rollover.cli.main import app
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.inference.posterior import drawn
-from rollover.diagnosis.own_model.files import found_at
+from rollover.diagnosis.own_model.declaration import found_at
 from rollover.effects import Search
 from rollover.recording.importers import write_recording
 from tests.diagnosis.drops import recorded, scenario
@@ -97,7 +97,7 @@ def test_ranks_of_the_truth_among_the_draws_are_uniform() -> None:
         every = recorded(changes, seed=k, speeds=(2.0, 3.5), noise=0.03, rate=200.0)
         found = [dataset_of(name, *simulated(scenario(), r)) for name, r in every]
         problem = Problem([e for e in found if e is not None])
-        align(problem)
+        estimate_time_shifts(problem)
         fitted = problem.fit((candidate,), (0.5,))
         assert fitted is not None
         values = drawn(problem, fitted, 500, seed=k).values

@@ -11,7 +11,7 @@ import pytest
 from rollover.diagnosis import probabilities as module
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.probabilities import credible, log_touched, log_usual, probabilities
-from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.selection.explanation import Explanation
 from tests.diagnosis.test_beside import DROPS, explanation, fitted
 
 CHANNELS = ("ground/force_normal", "ground/sinkage", "striker/acceleration_z")

@@ -15,7 +15,7 @@ from rollover.diagnosis import diagnose
 from rollover.diagnosis.fit.parameterisation import Candidate, physical
 from rollover.diagnosis.forward import full_run
 from rollover.diagnosis.forward.full_run import RunSimulator
-from rollover.diagnosis.overlay import series
+from rollover.diagnosis.overlay import overlays_of
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics import simulate
@@ -72,11 +72,11 @@ def test_friction_that_was_left_out_is_named_and_fitted(monkeypatch: pytest.Monk
     assert found.where[0].phase in ("impact", "sliding")
     assert any("full runs" in note for note in found.notes)
     assert found.after["held_out"].nrmse < 0.8 * found.before["held_out"].nrmse
-    shown, children = series(toss(), given, found), Children(2)
+    shown, children = overlays_of(toss(), given, found), Children(2)
     with monkeypatch.context() as patch:
         patch.setattr(RunSimulator, "_run", lambda own, _, changes: own._known[full_run._key(changes)])
         try:
-            side_by_side = series(toss(), given, found, children)  # no run is made here
+            side_by_side = overlays_of(toss(), given, found, children)  # no run is made here
         finally:
             children.stop()
     for one, other in zip(shown, side_by_side, strict=True):
@@ -119,9 +119,9 @@ def test_candidates_begin_at_what_the_scenario_has() -> None:
     for travels in by_friction.values():
         assert all(b / a < 1.1 for a, b in pairwise(travels))
         assert (min(travels), max(travels)) == (pytest.approx(0.03, rel=0.1), pytest.approx(0.6, rel=0.1))
-    some = replace(load, places=tuple(load.starts()[:3]))
-    assert some.probes() == load.starts()[:3]
-    assert by_id["ground-friction"].probes() == by_id["ground-friction"].starts()
+    some = replace(load, points=tuple(load.starts()[:3]))
+    assert some.scan_points() == load.starts()[:3]
+    assert by_id["ground-friction"].scan_points() == by_id["ground-friction"].starts()
 
 
 def test_values_are_found_by_their_paths() -> None:

@@ -9,17 +9,17 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import ResidualBlock
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Step
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.step import Inquiry, Step
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.inference.lack_of_fit import Cell, Mismatch
 from rollover.diagnosis.noise import autoregression
-from rollover.diagnosis.selection import decision, forward_step, pairs, stepwise
+from rollover.diagnosis.selection import decision, explanation, forward_step, pairs, stepwise
 from rollover.diagnosis.selection.candidates import candidates_of
-from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.decision import Explanation, by_first_effect, verdict_on
+from rollover.diagnosis.selection.decision import by_first_effect, verdict_on
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
@@ -32,7 +32,7 @@ IDS = ("soil-crust", "guide-friction", "mass")
 def left(p_value: float, structure: float = 0.0) -> Mismatch:
     cell = Cell(
         recording=0, channel="c", phase="impact", start=0.0, end=1.0, rows=np.arange(0), p_value=p_value, excess=0.0,
-        structured=structure + 12.0, waves=12, rough=0.0, noise=(12.0, 0.0),
+        structured=structure + 12.0, waves=12, noise_power=0.0, noise=(12.0, 0.0),
     )  # fmt: skip
     return Mismatch(cells=(cell,), p_value=p_value, adjusted=())
 
@@ -43,14 +43,14 @@ def step(count: int) -> Step:
     return Step(base=no_jacobian, fitted=Fitted(candidates=tuple(candidates), x=(0.5,) * count, blocks=()), p_value=0.0)
 
 
-def explanation(count: int, p_value: float) -> Explanation:
+def explanation_of(count: int, p_value: float) -> Explanation:
     parts = tuple(step(k + 1) for k in range(count))
-    looked = ScoreTest(score=99.0, scores={}, null=np.zeros(10), detectable={})
+    scored = ScoreTest(score=99.0, scores={}, null=np.zeros(10), detectable={})
     return Explanation(
         base=parts[0].base,
         fitted=parts[-1].fitted,
         parts=parts,
-        looked=looked,
+        scored=scored,
         detectable={},
         before=left(0.0, structure=1e5),
         after=left(p_value),
@@ -84,7 +84,10 @@ def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
     count: int, p_value: float, named: int, judged: dict[str, float]
 ) -> None:
     found, verdict = verdict_on(
-        cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(count, p_value), [], []
+        cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)),
+        explanation_of(count, p_value),
+        [],
+        [],
     )
     assert len(found.parts) == named
     assert verdict == ("missing-physics" if named else "unexplained")
@@ -93,11 +96,11 @@ def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
 @pytest.mark.parametrize(("local", "named"), [(0.5, SETTINGS.selection.flexibility.most_effects), (1e-5, 0)])
 def test_flexible_effects_must_leave_no_single_place(local: float, named: int, judged: dict[str, float]) -> None:
     """All places together hide one: chi-square of 960 takes no note of 50 beyond the 12 of one."""
-    found = explanation(SETTINGS.selection.flexibility.most_effects, 0.4)
+    found = explanation_of(SETTINGS.selection.flexibility.most_effects, 0.4)
     found = replace(found, after=replace(found.after, adjusted=(0.9, local)))
     problem = cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops))
     assert len(verdict_on(problem, found, [], [])[0].parts) == named
-    fewer = explanation(2, 0.4)
+    fewer = explanation_of(2, 0.4)
     assert len(verdict_on(problem, replace(fewer, after=found.after), [], [])[0].parts) == 2
 
 
@@ -110,7 +113,7 @@ def test_what_a_slight_effect_explains_whole_is_no_mismatch(
 ) -> None:
     monkeypatch.setattr(decision, "largest_change", lambda *_: moved)
     monkeypatch.setattr(decision, "mismatch_of", lambda *_: left(remaining))
-    one = explanation(1, 1e-9)
+    one = explanation_of(1, 1e-9)
     found = verdict_on(
         cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)),
         replace(one, parts=(), fitted=one.base),
@@ -123,7 +126,7 @@ def test_what_a_slight_effect_explains_whole_is_no_mismatch(
 def test_the_gain_of_an_effect_that_may_be_null_tells_nothing() -> None:
     """The p-value is that of the misfit then; of several, others may have gained what it seemed to."""
     problem = cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops))
-    one, two = (replace(explanation(count, 0.4), before=left(0.2)) for count in (1, 2))
+    one, two = (replace(explanation_of(count, 0.4), before=left(0.2)) for count in (1, 2))
     assert one.p_value < 1e-6  # of 99 that the best candidate scores
     refused = by_first_effect(problem, one, {IDS[0]}, [])
     assert (refused.parts, refused.fitted, refused.p_value) == ((), one.base, 0.2)
@@ -143,7 +146,7 @@ def test_a_maybe_null_effect_is_dropped_if_another_does_its_work(
     changes = {f"effects.sensor-lag.{k}": v for k, v in lag.items()}
     changes |= {f"effects.sensor-clock-offset.{k}": v for k, v in clock.items()} if offset else {}
     problem = judge_of(recorded(changes, speeds=(1.5, 2.5), channels=(FORCE, DEPTH, ACCELERATION), noise=0.001))
-    align(problem)
+    estimate_time_shifts(problem)
     able = candidates_of(problem.dataset, (), "drop")
     both = [
         next(c for c in able if (c.id, c.channel) == (id, ACCELERATION)) for id in ("sensor-lag", "sensor-clock-offset")
@@ -165,7 +168,7 @@ def test_a_maybe_null_effect_is_dropped_if_another_does_its_work(
 def test_two_of_one_sensor_must_leave_what_chance_leaves(
     channels: tuple[str | None, ...], named: int, judged: dict[str, float]
 ) -> None:
-    found = explanation(2, 0.002)
+    found = explanation_of(2, 0.002)
     candidates = tuple(replace(c, channel=k) for c, k in zip(found.fitted.candidates, channels, strict=True))
     found = replace(found, fitted=replace(found.fitted, candidates=candidates))
     problem: Any = SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)
@@ -182,7 +185,7 @@ def test_an_effect_that_takes_nearly_all_is_named(
     judged["soil-crust"] = misfit
     monkeypatch.setattr(decision, "mismatch_of", lambda *_: left(1e-9, structure))
     problem: Any = SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)
-    found, verdict = verdict_on(problem, explanation(2, 1e-4), [], [])
+    found, verdict = verdict_on(problem, explanation_of(2, 1e-4), [], [])
     assert verdict == ("missing-physics" if named else "unexplained")
     if named:
         assert found.fitted.label == "soil-crust"
@@ -207,7 +210,7 @@ def test_an_effect_that_hardly_predicts_better_is_not_named(
     """Whatever it leaves of those that it was fitted to."""
     judged |= {"as it is": start, "soil-crust": ahead}
     found, verdict = verdict_on(
-        cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(1, 0.4), [], []
+        cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation_of(1, 0.4), [], []
     )
     assert (len(found.parts), verdict) == (named, "missing-physics" if named else "unexplained")
 
@@ -220,7 +223,7 @@ def test_what_leaves_no_more_than_is_tolerated_is_named(
     for held_out, named, expected in ((1.1, 1, "missing-physics"), (3.5, 0, "unexplained")):
         judged["soil-crust"] = held_out
         found, verdict = verdict_on(
-            cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(1, 1e-9), [], []
+            cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation_of(1, 1e-9), [], []
         )
         assert (len(found.parts), verdict) == (named, expected)
 
@@ -242,7 +245,7 @@ def test_a_simpler_rival_that_fits_as_well_is_named_beside(
 
     base, best = fitted("none", 1000.0, 0), fitted("soil-viscous-damping", 100.0, 2)
     rival = fitted("soil-inertial-drag", 100.0 + more, numbers)
-    found = forward_step.confusion(Step(base=base, fitted=best, p_value=0.0, rivals=(best, rival)), [])
+    found = forward_step.confusion_set(Step(base=base, fitted=best, p_value=0.0, rivals=(best, rival)), [])
     assert found == ([best, rival] if named else [best])
 
 
@@ -254,15 +257,15 @@ def test_condition_errors_count_where_they_leave_chance_alone(
     reweighted: list[str] = []
     found, again = step(1), step(2).fitted
     problem = cast(Problem, SimpleNamespace(dataset="as it is", with_noise_model=reweighted.append))
-    monkeypatch.setattr(stepwise, "has_uncertain_conditions", lambda _: True)
-    monkeypatch.setattr(stepwise, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
-    monkeypatch.setattr(stepwise, "refitted_with_conditions", lambda *_: again)
-    monkeypatch.setattr(stepwise, "mismatch_of", lambda *_: left(beside))
-    after, remaining = stepwise.with_conditions_refitted(problem, found, left(1e-9), [])
+    monkeypatch.setattr(explanation, "has_uncertain_conditions", lambda _: True)
+    monkeypatch.setattr(explanation, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
+    monkeypatch.setattr(explanation, "refitted_with_conditions", lambda *_: again)
+    monkeypatch.setattr(explanation, "mismatch_of", lambda *_: left(beside))
+    after, remaining = explanation.with_conditions_refitted(problem, found, left(1e-9), [])
     assert (after.fitted is again) == taken
     assert remaining.p_value == (beside if taken else 1e-9)
     assert reweighted == ([] if taken else ["as it is"])
-    same, _ = stepwise.with_conditions_refitted(problem, found, left(0.4), [])
+    same, _ = explanation.with_conditions_refitted(problem, found, left(0.4), [])
     assert same is found, "nothing is left to be eased"
 
 
@@ -309,9 +312,9 @@ def test_beside_a_resonance_the_other_of_a_pair_is_refitted(
 
 def test_effects_that_may_be_any_others_are_not_named(judged: dict[str, float]) -> None:
     problem = cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops))
-    found = explanation(SETTINGS.selection.flexibility.most_effects, 0.4)
+    found = explanation_of(SETTINGS.selection.flexibility.most_effects, 0.4)
     assert len(verdict_on(problem, found, [], [])[0].parts) == SETTINGS.selection.flexibility.most_effects
-    refused, verdict = verdict_on(problem, replace(found, settled=False), [], [])
+    refused, verdict = verdict_on(problem, replace(found, is_unique=False), [], [])
     assert (refused.parts, verdict) == ((), "unexplained")
 
 
@@ -323,7 +326,7 @@ def test_effects_beside_a_curved_sensor_are_not_named_together(
     monkeypatch.setattr(decision, "is_a_curve", lambda *_: True)
     judged["soil-crust"] = alone
     found, verdict = verdict_on(
-        cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(2, 0.4), [], []
+        cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation_of(2, 0.4), [], []
     )
     assert [s.fitted.candidates[-1].id for s in found.parts] == named
     assert verdict == ("missing-physics" if named else "unexplained")

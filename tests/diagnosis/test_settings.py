@@ -81,7 +81,7 @@ def test_a_number_of_a_module_is_found_but_not_a_derived_one() -> None:
 
 def test_every_setting_says_what_it_is() -> None:
     files = sorted((ROOT / "settings").glob("*.py"))
-    assert len(files) == 9
+    assert len(files) == 8
     assert [n for path in files for n in undocumented(path.read_text(encoding="utf-8"))] == []
 
 

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.fit.jobs import Executor, Task, linearised
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.jobs import Executor
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
+from rollover.diagnosis.fit.local_search import linearised
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
-from rollover.diagnosis.fit.step import Screened
-from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.fit.step import Inquiry, Screened
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.selection.forward_step import _first_fits
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import screen
@@ -136,13 +138,13 @@ def test_a_rival_is_compared_with_equally_fixed_time_shifts() -> None:
 
 def leading(problem: Problem, base: Fitted, scores: Mapping[str, float]) -> set[str]:
     """Keys of what is worth a whole fit after first ones, for some scores."""
-    looked = ScoreTest(score=9.0, scores=scores, null=np.zeros(4), detectable={})
-    screened = [Screened(candidate=c, starts=((0.02,),), left=1.0, potential=1.0) for c in (SLOPE, MASS)]
+    scored = ScoreTest(score=9.0, scores=scores, null=np.zeros(4), detectable={})
+    screened = [Screened(candidate=c, starts=((0.02,),), chi2=1.0, potential=1.0) for c in (SLOPE, MASS)]
     with Executor() as executor:
         inquiry = Inquiry(
             problem=problem, candidates=(SLOPE, MASS), groups=[], phases=[], say=lambda _: None, executor=executor
         )
-        _, leaders = _first_fits(inquiry, base, screened, (0, 1), (0.0, 0.0), looked)
+        _, leaders = _first_fits(inquiry, base, screened, (0, 1), (0.0, 0.0), scored)
     return {f.candidates[-1].key for f in leaders}
 
 
@@ -181,13 +183,13 @@ def test_runs_are_announced_before_they_are_needed(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(Problem, "_made", asked)
     base = problem.fit((), (), shifts=[0.0, 0.0])
     assert base is not None
-    looked = ScoreTest(score=9.0, scores={SLOPE.key: 9.0, MASS.key: 8.0}, null=np.zeros(4), detectable={})
+    scored = ScoreTest(score=9.0, scores={SLOPE.key: 9.0, MASS.key: 8.0}, null=np.zeros(4), detectable={})
     with Executor() as executor:
         inquiry = Inquiry(
             problem=problem, candidates=(SLOPE, MASS), groups=[], phases=[], say=lambda _: None, executor=executor
         )
-        screened = screen(inquiry, base, (SLOPE, MASS), (0, 1), (0.0, 0.0), looked)
-        leaders = _first_fits(inquiry, base, screened, (0, 1), (0.0, 0.0), looked)[1]
+        screened = screen(inquiry, base, (SLOPE, MASS), (0, 1), (0.0, 0.0), scored)
+        leaders = _first_fits(inquiry, base, screened, (0, 1), (0.0, 0.0), scored)[1]
         monkeypatch.setattr(Problem, "_fit", lambda *_: None)
         before = len(announced)
         inquiry.fits([Task(candidates=(SLOPE,), start=(at,), shifts=(0.0, 0.0)) for at in (0.311, 0.713)])

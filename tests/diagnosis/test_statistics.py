@@ -14,13 +14,13 @@ from scipy.stats import kstest
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.linearisation import without_shift_direction
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.forward.averaging import block_averaged
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
-from rollover.diagnosis.selection.score_test import null_of_maximum, p_value
+from rollover.diagnosis.selection.score_test import null_from_gram, p_value
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from rollover.recording import Recording
@@ -100,7 +100,7 @@ def test_linearised_cross_validation_equals_a_refit() -> None:
             w = b.residual - b.J @ dx
             both = np.append(b.slope, 1.0 / 0.3)
             tau = float(both[:-1] @ w) / float(both @ both)
-            assert held.left[r] == pytest.approx(float(np.sum((w - b.slope * tau) ** 2)) + (tau / 0.3) ** 2, rel=1e-9)
+            assert held.chi2[r] == pytest.approx(float(np.sum((w - b.slope * tau) ** 2)) + (tau / 0.3) ** 2, rel=1e-9)
 
 
 def test_null_of_the_best_is_that_of_simulated_noise() -> None:
@@ -108,8 +108,8 @@ def test_null_of_the_best_is_that_of_simulated_noise() -> None:
     d = [rng.standard_normal((50, 4)), rng.standard_normal((40, 4))]
     for part in d:
         part[:, 3] = part[:, 2] + 0.1 * rng.standard_normal(part.shape[0])  # two that are nearly one
-    null = null_of_maximum(d)
     D = np.vstack(d)
+    null = null_from_gram(D.T @ D)
     z = rng.standard_normal((20_000, 90)) @ (D / np.linalg.norm(D, axis=0))
     best = np.max(z * z, axis=1)
     for q in (0.5, 0.9, 0.99):
@@ -162,7 +162,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
             ((name, value),) = held[0].fixed.items()
             k = list(candidate().search).index(name)
             d = coordinate(value, candidate().search[name]) - fitted.x[k]
-            return SimpleNamespace(left=fitted.left + d * d / np.linalg.inv(curved)[k, k])
+            return SimpleNamespace(chi2=fitted.chi2 + d * d / np.linalg.inv(curved)[k, k])
 
         problem.block, problem.fit = block, fit
         found = intervals(problem, fitted)[0]

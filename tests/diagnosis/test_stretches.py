@@ -12,13 +12,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from rollover.diagnosis import io
+from rollover.diagnosis import pipeline
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.data.stretches import BEFORE, before, channel_of, onset, parted
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.forward.forward_model import Simulator
+from rollover.diagnosis.forward.interface import Simulator
 from rollover.diagnosis.inference.discrepancy import (
     MEDIAN,
     SPREAD,
@@ -150,7 +150,7 @@ def test_an_early_effect_shows_beside_a_late_difference() -> None:
         problem = held_against(every, replace(learned, scales=scales, times={}))
         fitted = problem.fit((HEIGHT,), (0.5,))
         assert fitted is not None
-        gains[how] = (base_of(problem).left - fitted.left) / problem.samples_per_draw
+        gains[how] = (base_of(problem).chi2 - fitted.chi2) / problem.samples_per_draw
         if how == "sides":
             assert -0.1 + 0.2 * fitted.x[0] == pytest.approx(0.08, abs=0.002)
     # beyond what the best of a hundred candidates gains by chance, Sidak's 1 - 1e-3/100 quantile of chi^2 of one: 19.5
@@ -208,8 +208,8 @@ def test_a_folder_says_by_names_which_are_references(tmp_path: Path, monkeypatch
         seen.append(([name for name, _ in recordings], list(reference)))
 
     for name, stand_in in (("diagnose", kept), ("load", lambda _: None), ("json_of", lambda _: {})):
-        monkeypatch.setattr(io, name, stand_in)
-    assert io.diagnose_folder(tmp_path) == {}
+        monkeypatch.setattr(pipeline, name, stand_in)
+    assert pipeline.diagnose_folder(tmp_path) == {}
     assert seen == [(["r1", "r2", "reference1", "reference2"], ["reference1", "reference2"])]
 
 

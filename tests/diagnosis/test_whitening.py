@@ -23,8 +23,8 @@ def test_a_stack_is_whitened_signal_by_signal() -> None:
     """g (x_i - a_1 x_i-1 - a_2 x_i-2) of the second alone: nothing of the first comes in, which has no colour."""
     x = np.random.default_rng(1).standard_normal(30)
     ar = (0.5, 0.2)
-    white = Noise(count=10, sigma=2.0, ar=(), loud=None, weight=None)
-    coloured = Noise(count=20, sigma=4.0, ar=ar, loud=None, weight=None)
+    white = Noise(count=10, sigma=2.0, ar=(), sd=None, weight=None)
+    coloured = Noise(count=20, sigma=4.0, ar=ar, sd=None, weight=None)
     y = stack(white, coloured)(x)
     assert np.array_equal(y[:10], x[:10] / 2.0)
     expected = grown(ar) * lfilter([1.0, -0.5, -0.2], [1.0], x[10:] / 4.0)
@@ -34,9 +34,9 @@ def test_a_stack_is_whitened_signal_by_signal() -> None:
 
 def test_growing_noise_is_scaled_before_whitening() -> None:
     rng = np.random.default_rng(2)
-    x, loud, weight = rng.standard_normal(12), np.linspace(1.0, 3.0, 12), np.linspace(1.0, 0.1, 12)
-    y = stack(Noise(count=12, sigma=2.0, ar=(0.6,), loud=loud, weight=weight))(x)
-    u = x / loud
+    x, sd, weight = rng.standard_normal(12), np.linspace(1.0, 3.0, 12), np.linspace(1.0, 0.1, 12)
+    y = stack(Noise(count=12, sigma=2.0, ar=(0.6,), sd=sd, weight=weight))(x)
+    u = x / sd
     assert y[1:] == pytest.approx(weight[1:] * grown((0.6,)) * (u[1:] - 0.6 * u[:-1]), rel=1e-12)
 
 
@@ -44,7 +44,7 @@ def test_columns_are_whitened_each_and_what_is_handed_in_stays() -> None:
     rng = np.random.default_rng(3)
     columns = rng.standard_normal((9, 3))
     before = columns.copy()
-    one = stack(Noise(count=9, sigma=0.5, ar=(0.3,), loud=None, weight=None))
+    one = stack(Noise(count=9, sigma=0.5, ar=(0.3,), sd=None, weight=None))
     found = one(columns)
     assert np.array_equal(columns, before)
     for k in range(3):
@@ -52,7 +52,7 @@ def test_columns_are_whitened_each_and_what_is_handed_in_stays() -> None:
 
 
 def test_a_signal_shorter_than_its_memory_tells_nothing() -> None:
-    short = Noise(count=1, sigma=1.0, ar=(0.5, 0.2), loud=None, weight=None)
+    short = Noise(count=1, sigma=1.0, ar=(0.5, 0.2), sd=None, weight=None)
     assert np.array_equal(stack(short, short)(np.ones(2)), np.zeros(2))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import rollover as ro
 from rollover.diagnosis.own_model import diagnose_model, load_model
-from rollover.diagnosis.own_model.files import found_at
+from rollover.diagnosis.own_model.declaration import found_at
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 from rollover.spec.channels import CHANNELS

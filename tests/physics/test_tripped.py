@@ -10,9 +10,9 @@ import pytest
 
 from rollover.dynamics.result import Run
 from rollover.dynamics.simulate import run
-from rollover.inputs import Shake
 from rollover.scenario import Scenario
 from rollover.spec.document import to_mapping
+from rollover.spec.inputs import Shake
 from rollover.spec.vehicle import Vehicle, laden
 from tests.physics.scenes import shipped
 from tests.physics.test_tipping import S

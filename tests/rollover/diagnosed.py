@@ -8,7 +8,7 @@ import numpy as np
 
 from rollover.diagnosis import Diagnosis
 from rollover.diagnosis.overlay import Overlay, Track
-from rollover.diagnosis.result import Considered, Interval, Named, Place, Score
+from rollover.diagnosis.result import Considered, Interval, Location, Named, Score
 
 FORCE = "ground/force_normal"
 
@@ -16,7 +16,7 @@ FORCE = "ground/force_normal"
 def sensor_at_fault() -> Diagnosis:
     """The load cell of two drops reads 8 % too much; a rival and a remainder are there."""
     gain = Interval(value=1.08, low=1.07, high=1.09, unit="-", at_bound=True)
-    where = Place(
+    where = Location(
         recording="one",
         channel=FORCE,
         phase="loading",

@@ -15,7 +15,7 @@ from typer.testing import CliRunner, Result
 from rollover.cli.commands.diagnose import tolerances
 from rollover.cli.main import app
 from rollover.diagnosis import Diagnosis, json_of
-from rollover.diagnosis.overlay import series
+from rollover.diagnosis.overlay import overlays_of
 from rollover.diagnosis.result import Estimate
 from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Recording
@@ -167,7 +167,7 @@ def test_series_are_what_the_diagnosed_scenario_predicts(folder: Path) -> None:
     )
     found = replace(sensor_at_fault(), effects=(effect,), training=("v1",), held_out=("v2",))
     recordings = [(name, read_recording(folder / f"{name}.csv")) for name in ("v1", "v2")]
-    shown = series(load(find("drop_test")), recordings, found)
+    shown = overlays_of(load(find("drop_test")), recordings, found)
     assert [(one.recording, one.held_out) for one in shown] == [("v1", False), ("v2", True)]
     for one, (_, recording) in zip(shown, recordings, strict=True):
         assert abs(one.shift) < 5e-4
@@ -179,7 +179,7 @@ def test_series_are_what_the_diagnosed_scenario_predicts(folder: Path) -> None:
         rms = {when: float(np.sqrt(np.mean((sinkage.measured - v) ** 2))) for when, v in off.items()}
         assert rms["after"] == pytest.approx(SIGMA["ground/sinkage"], rel=0.25)
         assert rms["before"] > 10.0 * rms["after"]
-    assert all(t.after is None for t in series(load(find("drop_test")), recordings[:1], nothing_found())[0].tracks)
+    assert all(t.after is None for t in overlays_of(load(find("drop_test")), recordings[:1], nothing_found())[0].tracks)
 
 
 def test_the_page_says_it_all(done: tuple[Path, Result], folder: Path) -> None:
@@ -279,7 +279,7 @@ def test_an_estimate_is_made_as_it_is_asked_for(
         seen.append(estimate)
         raise InputError(Fault(message="enough"))
 
-    monkeypatch.setattr("rollover.diagnosis.sensors_first.diagnosed", diagnosed)
+    monkeypatch.setattr("rollover.diagnosis.asked.diagnosed_with_prechecks", diagnosed)
     assert rollover("diagnose", "drop_test", folder, "--out", tmp_path / "out", *words).exit_code == 2
     assert seen == [asked]
 

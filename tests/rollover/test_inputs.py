@@ -11,11 +11,11 @@ import pytest
 
 from rollover.dynamics import drop_test
 from rollover.dynamics.simulate import run
-from rollover.inputs import Signal
 from rollover.recording import Recording
 from rollover.recording.importers import write_recording
 from rollover.scenario import Scenario, load
 from rollover.spec import document
+from rollover.spec.inputs import Signal
 from rollover.system.errors import InputError
 
 TIME, FORCE = np.arange(0.0, 0.3, 0.01), 300.0 * np.sin(np.arange(0.0, 0.3, 0.01) * 21.0)

@@ -34,8 +34,8 @@ from viz.pages.web_page import Viewer
 QUICK = ("import", "import parquet", "import mme", "synthesize", "view", "new", "rolling")
 QUICK += ("export", "export xlsx", "export mat", "export mme")
 WORK = (
-    "rollover.diagnosis.sensors_first.diagnosed",
-    "rollover.diagnosis.overlay.series",
+    "rollover.diagnosis.asked.diagnosed_with_prechecks",
+    "rollover.diagnosis.overlay.overlays_of",
     "rollover.diagnosis.planning.plan.plan",
     "rollover.diagnosis.own_model.diagnose_model",
     "rollover.calibration.request.calibrate",

@@ -68,7 +68,7 @@ def markdown(found: Diagnosis) -> str:
         if e.indistinguishable_from:
             lines += [f"Not distinguishable from {', '.join(e.indistinguishable_from)}.", ""]
             lines += [f"Measure next: {e.discriminating_test}.", ""] if e.discriminating_test else []
-            lines += [f"By these recordings: {e.next_test.says()}.", ""] if e.next_test is not None else []
+            lines += [f"By these recordings: {e.next_test.message()}.", ""] if e.next_test is not None else []
     if found.where:
         lines += ["## Where", "", "| recording | channel | phase | share |", "|-|-|-|-|"]
         lines += [f"| {p.recording} | {p.channel} | {p.phase} | {100.0 * p.share:.0f} % |" for p in found.where[:6]]

@@ -8,7 +8,7 @@ from typing import Any
 
 from rollover.diagnosis import Diagnosis
 from rollover.diagnosis.overlay import Overlay, Track
-from rollover.diagnosis.result import Place, Score
+from rollover.diagnosis.result import Location, Score
 from rollover.effects import effects
 from rollover.recording.checks import Finding
 from rollover.scenario import Scenario
@@ -102,7 +102,7 @@ def _where(found: Diagnosis, overlays: Sequence[Overlay], each: Each) -> list[Bl
     if rest:
         blocks.append(Details(summary="All other channels and recordings", blocks=rest))
     if found.where:
-        blocks.append(_places(found.where, "Share: of all misfit beyond the noise, before anything was changed."))
+        blocks.append(_locations(found.where, "Share: of all misfit beyond the noise, before anything was changed."))
     if found.where and any(share >= LEAST_SHARE for _, share in found.dependencies):
         table = Table(
             columns=["the residual force as a function of", "predicts, %"],
@@ -116,7 +116,7 @@ def _where(found: Diagnosis, overlays: Sequence[Overlay], each: Each) -> list[Bl
         text = f"Structure remains in the misfit ({_chance(found.remaining_p_value)})."
         blocks.append(Note(text=text, warning=True))
         if found.remaining_where and found.effects:
-            blocks.append(_places(found.remaining_where, "Share of the misfit that remains."))
+            blocks.append(_locations(found.remaining_where, "Share of the misfit that remains."))
     title = "Where they differ" if found.where else "Measured and simulated"
     return [Section(title=title, blocks=blocks)] if blocks else []
 
@@ -158,7 +158,7 @@ def _figure(drawn: tuple[Overlay, str]) -> Figure:
     return Figure(svg=svg, caption=caption)
 
 
-def _places(places: Sequence[Place], caption: str) -> Table:
+def _locations(locations: Sequence[Location], caption: str) -> Table:
     rows: list[Row] = [
         [
             p.recording,
@@ -169,7 +169,7 @@ def _places(places: Sequence[Place], caption: str) -> Table:
             f"{100.0 * p.share:.1f}",
             "" if p.depends_on is None else label_of(p.depends_on),
         ]
-        for p in places
+        for p in locations
     ]
     columns = ["recording", "channel", "phase", "from, s", "to, s", "share, %", "depends on"]
     return Table(columns=columns, rows=rows, numeric=(3, 4, 5), caption=caption)
@@ -224,7 +224,7 @@ def _next(found: Diagnosis) -> list[Block]:
             if e.discriminating_test:
                 blocks.append(Note(text=f"Measure next: {e.discriminating_test}."))
             if e.next_test is not None:
-                blocks.append(Note(text=f"By these recordings: {e.next_test.says()}."))
+                blocks.append(Note(text=f"By these recordings: {e.next_test.message()}."))
         else:
             confirm = f" To confirm it: {e.discriminating_test}." if e.discriminating_test else ""
             blocks.append(Note(text=f"{own}: no other candidate predicts the held-out recordings as well.{confirm}"))

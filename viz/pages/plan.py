@@ -78,7 +78,7 @@ def headline(found: Plan) -> Headline:
     apart = len(pairs) - len(confused)
     plural = "" if len(pairs) == 1 else "s"
     told = f", {apart} of {len(pairs)} pair{plural} told apart with {found.told_apart:.0%} or more" if pairs else ""
-    best = [a.best.says() for a in found.next_tests if a.best is not None]
+    best = [a.best.message() for a in found.next_tests if a.best is not None]
     return Headline(
         sentence=f"{len(seen)} of {len(found.effects)} effects would show in these drops{told}.",
         detail=f"Next: {best[0]}." if best else "",
@@ -111,7 +111,7 @@ def _confused(found: Plan) -> list[Block]:
 def _next(found: Plan) -> list[Block]:
     blocks: list[Block] = []
     for a in found.next_tests:
-        blocks.append(Note(text=a.says(), warning=not a.is_enough))
+        blocks.append(Note(text=a.message(), warning=not a.is_enough))
         if a.known:
             blocks.append(Note(text=f"In general: {a.known}."))
         rows: list[list[str | Cell]] = [

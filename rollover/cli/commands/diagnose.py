@@ -149,11 +149,16 @@ def diagnose(
     from rollover.cli import console
     from rollover.comparison.recordings import held_out, read
     from rollover.diagnosis import diagnosed_text, json_of
-    from rollover.diagnosis.asked import check_is_drop
+    from rollover.diagnosis.asked import (
+        check_conditions,
+        check_is_drop,
+        diagnosed_with_prechecks,
+        plain_findings,
+        sensor_precheck,
+    )
     from rollover.diagnosis.fit.jobs import Executor
     from rollover.diagnosis.io import DRAWS, FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
-    from rollover.diagnosis.overlay import series
-    from rollover.diagnosis.sensors_first import check, diagnosed, plain, sensor_precheck
+    from rollover.diagnosis.overlay import overlays_of
     from rollover.spec import document
     from rollover.system.writing import notes
 
@@ -162,7 +167,7 @@ def diagnose(
         installed()
         check_is_drop(chosen, OPTION)
     measured = read(recordings, profile)
-    check(chosen, measured)
+    check_conditions(chosen, measured)
     held = held_out(list(measured), hold_out or [], "--hold-out")
     taught = _references(list(measured), reference or [], held)
     allowed = tolerances(tolerance or [], measured)
@@ -194,7 +199,7 @@ def diagnose(
     words += ["--posterior", "--draws", str(draws)] if posterior else []
     words += [] if how == "unexplained" else ["--estimate" if how else "--no-estimate"]
     with Executor(workers, notebook, about_fits) as executor:
-        found = diagnosed(
+        found = diagnosed_with_prechecks(
             chosen,
             measured,
             findings,
@@ -206,8 +211,8 @@ def diagnose(
             say=console.say,
             executor=executor,
         )
-        overlays = series(chosen, list(measured.items()), found, executor.children)
-        answer = json_of(found, about, plain(findings))
+        overlays = overlays_of(chosen, list(measured.items()), found, executor.children)
+        answer = json_of(found, about, plain_findings(findings))
         with results.whole(folder) as part, ThreadPoolExecutor(1) as beside:
             results.write_json(part / JSON, answer)
             if found.posterior is not None:
@@ -257,15 +262,15 @@ def _diagnose_model(
     from rollover.comparison.recordings import held_out, read
     from rollover.diagnosis.fit.jobs import Executor
     from rollover.diagnosis.io import FORMAT, JSON
-    from rollover.diagnosis.own_model import diagnose_model, files, json_of
+    from rollover.diagnosis.own_model import declaration, diagnose_model, json_of
     from rollover.diagnosis.own_model.tables import tables
     from rollover.system.processes import cores
     from rollover.system.writing import notes
 
     if refused:
         raise InputError(Fault(file=refused[0], message="beside --model, got both; it is of scenarios alone"))
-    path = files.found_at(name)
-    model = files.load_model(path)
+    path = declaration.found_at(name)
+    model = declaration.load_model(path)
     with tables(model):
         measured = read(paths, profile)
     held = held_out(list(measured), hold_out, "--hold-out") if hold_out else []
@@ -275,7 +280,7 @@ def _diagnose_model(
         raise InputError(Fault(file="--tolerance", message=message))
     folder = out or Path("out", "diagnose", path.stem)
     about: dict[str, Any] = {
-        "own_code": {files.KIND: files.hashes(path)},
+        "own_code": {declaration.FOLDER: declaration.hashes(path)},
         "recordings": list(measured),
         "hold_out": held,
         "tolerance": allowed,

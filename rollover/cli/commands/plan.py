@@ -80,8 +80,7 @@ def plan_(
     from rollover.assessment import results
     from rollover.cli import console
     from rollover.comparison.synthesis import DROP
-    from rollover.diagnosis.planning.io import FILES, FORMAT, JSON, PAGE, json_of
-    from rollover.diagnosis.planning.plan import plan, usual_noise
+    from rollover.diagnosis.planning.plan import FILES, FORMAT, JSON, PAGE, json_of, plan, usual_noise
     from rollover.diagnosis.planning.planned import Instruments
     from rollover.dynamics.drop_test import unfit
     from rollover.spec import document

@@ -45,5 +45,5 @@ def plan(found: Plan, folder: str) -> None:
         for pair in found.confused():
             out.print(f"{pair.effect} beside {pair.rival}: chosen rightly with {pair.probability:.0%}", style="yellow")
     for advice in found.next_tests:
-        out.print(advice.says(), style="" if advice.is_enough else "yellow")
+        out.print(advice.message(), style="" if advice.is_enough else "yellow")
     out.print(f"Results: {folder}")

@@ -149,7 +149,7 @@ def diagnosis(found: Diagnosis, folder: str) -> None:
         if e.indistinguishable_from:
             out.print(f"{e.id} or {', '.join(e.indistinguishable_from)}: measure next: {e.discriminating_test}")
         if e.next_test is not None:
-            out.print(f"By these recordings: {e.next_test.says()}.")
+            out.print(f"By these recordings: {e.next_test.message()}.")
     for note in found.notes:
         out.print(note, style="yellow")
     out.print(f"Results: {folder}")

@@ -5,26 +5,30 @@ covariance 1 + N N' in place of 1. With N = U S V',
 
     w -> (1 + N N')^-1/2 w = w - U (1 - (1 + S^2)^-1/2) U'w                                                    (D5)
 
-has the covariance 1 again: what an error of the conditions would do counts little, all else as before.
+has the covariance 1 again: what an error of the conditions would do counts little, all else as before. A measured
+condition is at least as uncertain as the digits in which it is written.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.settings import SETTINGS
-from rollover.recording import StandardUncertainty
+from rollover.recording import Recording, StandardUncertainty
 from rollover.scenario import Scenario
 from rollover.spec.document import paths
 from rollover.system.errors import Fault, InputError, hint
 
+MEASURED = ("initiation.speed", "vehicle.mass")  # what is read off an instrument
 Array = NDArray[np.float64]
 TUNING = SETTINGS.data.condition_uncertainty
+ROUNDING = SETTINGS.data.rounding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,8 +69,8 @@ def marginalised(columns: Array) -> Marginalised:
     if columns.shape[1] == 0:
         return Marginalised(directions=columns, shares=np.zeros(0))
     U, S, _ = np.linalg.svd(columns, full_matrices=False)
-    kept = TUNING.least_singular_value * max(float(S.max(initial=0.0)), 1e-300) < S
-    return Marginalised(directions=U[:, kept], shares=1.0 - 1.0 / np.sqrt(1.0 + S[kept] ** 2))
+    retained = TUNING.least_singular_value * max(float(S.max(initial=0.0)), 1e-300) < S
+    return Marginalised(directions=U[:, retained], shares=1.0 - 1.0 / np.sqrt(1.0 + S[retained] ** 2))
 
 
 def nuisance_parameters(
@@ -91,3 +95,36 @@ def nuisance_parameters(
             moved = [v + one * (j == k) for j, v in enumerate(many)]
             found.append({path: tuple(moved) if isinstance(value, list) else moved[0]})
     return found
+
+
+def with_rounding_uncertainty(
+    recordings: Sequence[tuple[str, Recording]],
+) -> tuple[list[tuple[str, Recording]], list[str]]:
+    """The recordings with the rounding of what was measured as its uncertainty, and a line for each such condition.
+
+    1 sigma is 10^-d/sqrt(12), d the most decimals in which any recording states that condition: 1.9 beside 2.19 is
+    1.90. Left as they are: what a sidecar gives an uncertainty, and what may as well be nominal, see `most_rounding`.
+    """
+    known: dict[str, float] = {}
+    for path in MEASURED:
+        open_ = [r.conditions[path] for _, r in recordings if path in r.conditions and path not in r.uncertainty]
+        values = [float(v) for v in open_ if isinstance(v, (int, float))]
+        sigma = 10.0 ** -max(map(decimals, values), default=ROUNDING.most_decimals) / math.sqrt(12.0)
+        shares = [sigma / abs(v) if v else math.inf for v in values]
+        if values and max(shares) <= ROUNDING.most_rounding and max(shares) > ROUNDING.least_rounding:
+            known[path] = sigma
+    rounded = [
+        (name, replace(r, uncertainty={**{p: s for p, s in known.items() if p in r.conditions}, **r.uncertainty}))
+        for name, r in recordings
+    ]
+    return rounded, [
+        f"{path} is taken as rounded, +-{s:.2g}: state it as `uncertainty` in the sidecar" for path, s in known.items()
+    ]
+
+
+def decimals(value: float) -> int:
+    """Digits behind the point of a number as it is written: 2 of 1.25, none of 130.0."""
+    text = f"{value:.{ROUNDING.most_decimals}g}"
+    if "e" in text:
+        return ROUNDING.most_decimals if abs(value) < 1.0 else 0
+    return len(text.partition(".")[2])

@@ -20,7 +20,7 @@ from rollover.diagnosis.forward.discontinuities import (
     near_discontinuity,
     weights_after_discontinuities,
 )
-from rollover.diagnosis.forward.forward_model import Simulator
+from rollover.diagnosis.forward.interface import Simulator
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from rollover.recording.noise_floor import LENGTH, USUAL, NoiseFloor, grown, noise_floor
@@ -29,7 +29,7 @@ from rollover.scenario import Scenario
 Array = NDArray[np.float64]
 
 TUNING = SETTINGS.data.dataset
-NOTHING: Mapping[str, Array] = MappingProxyType({})
+EMPTY: Mapping[str, Array] = MappingProxyType({})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,8 +77,8 @@ class Signal:
     def spread(self) -> Noise:
         """What its samples are whitened by; the noise alone grows with the value, not what a model may be off by."""
         rest = max(self.sigma**2 - self.noise**2, 0.0)
-        loud = None if self.level is None else np.sqrt((self.noise * self.level) ** 2 + rest)
-        return Noise(count=self.rows.size, sigma=self.sigma, ar=self.ar, loud=loud, weight=self.weight)
+        sd = None if self.level is None else np.sqrt((self.noise * self.level) ** 2 + rest)
+        return Noise(count=self.rows.size, sigma=self.sigma, ar=self.ar, sd=sd, weight=self.weight)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,7 +213,7 @@ class Dataset:
         """The same of the measurement."""
         return self.whitened(self.values)
 
-    def discontinuities(self, raw: Array, predicted: Mapping[str, Array] = NOTHING) -> NDArray[np.int64]:
+    def discontinuities(self, raw: Array, predicted: Mapping[str, Array] = EMPTY) -> NDArray[np.int64]:
         """Samples (stacked) about which a prediction jumps, and means within which it is `predicted` to."""
         own = self._inside
         found: NDArray[np.bool_] = near_discontinuity(raw, own.least, own.first, own.last)
@@ -288,7 +288,7 @@ class Dataset:
 
 
 def with_uncertain_conditions(e: Dataset, scenario: Scenario) -> Dataset:
-    """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
+    """The dataset with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
     return with_uncertain_conditions_at(
         replace(e, doubtful=tuple(nuisance_parameters(scenario, e.recording.uncertainty, e.name))), {}
     )

@@ -1,4 +1,4 @@
-"""Slips of the pen: channels that stand in another unit than is stated, or with the opposite sign.
+"""Unit and sign errors: channels that stand in another unit than is stated, or with the opposite sign.
 
 Of what was measured, m, and what the simulation says, s, at the time shift at which the two are most alike,
 
@@ -7,7 +7,7 @@ Of what was measured, m, and what the simulation says, s, at the time shift at w
 a is the factor between them, r how alike they are. No effect turns a channel round or makes 9.81 times as much of it in
 one recording: where |r| is near 1 and a, over what it is in the other recordings, is what the other sign or another
 unit makes, that is what happened. Such a channel tells nothing of what is missing, and what it misses would drown the
-rest: it is left aside, which is said. Where neighbouring runs (`chaos`) are no more alike, none can tell. What all
+rest: it is left aside, which is said. Where perturbed runs are no more alike, none can tell. What all
 recordings of a channel are too large by is its gain or scale, which is fitted; only if nothing is found beside that is
 it left aside too.
 """
@@ -31,12 +31,12 @@ from rollover.spec.channels import UNITS, describe
 
 TUNING = SETTINGS.data.inconsistent
 # times its prior, where a time shift is looked for
-PLACES = np.linspace(-TUNING.shift_width, TUNING.shift_width, TUNING.shift_steps)
+SHIFTS = np.linspace(-TUNING.shift_width, TUNING.shift_width, TUNING.shift_steps)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Aside(ABC):
-    """What is left aside as no recording of what it states: a channel, or all of a recording as a channel shows."""
+    """What is excluded since it contradicts what it states: a channel, or all of a recording as a channel shows."""
 
     dataset: Dataset
     signal: Signal
@@ -44,7 +44,7 @@ class Aside(ABC):
     summary: ClassVar[str]
 
     @abstractmethod
-    def says(self) -> str:
+    def message(self) -> str:
         """The sentence on it."""
 
 
@@ -57,7 +57,7 @@ class Inconsistency(Aside):
 
     summary = "Channels stand in another unit than is stated, or with the opposite sign."
 
-    def says(self) -> str:
+    def message(self) -> str:
         """The sentence on it."""
         return (
             f"{self.dataset.name}: {self.signal.channel} reads {spoken(self.factor)} times what is simulated, as if "
@@ -66,7 +66,7 @@ class Inconsistency(Aside):
 
 
 def find_inconsistencies(every: Sequence[Dataset]) -> tuple[list[Inconsistency], list[Inconsistency]]:
-    """Slips that only some recordings of a channel have, and those that all of them share."""
+    """Unit and sign errors that only some recordings of a channel have, and those that all of them share."""
     met: dict[str, list[tuple[Dataset, Signal, float]]] = {}
     for e in every:
         made = e.simulator.predict({}, 0.0) or {}
@@ -87,7 +87,7 @@ def find_inconsistencies(every: Sequence[Dataset]) -> tuple[list[Inconsistency],
 
 
 def _is_chance(inconsistency: Inconsistency) -> bool:
-    """Whether runs that nobody could tell apart are less alike in its channel than a slip would have to be.
+    """Whether perturbed runs correlate less in its channel than a unit error would have to.
 
     Of an overturn straight backward, which way the vehicle falls at its end.
     """
@@ -101,22 +101,22 @@ def _is_chance(inconsistency: Inconsistency) -> bool:
 
 
 def without_inconsistent(every: Sequence[Dataset], inconsistencies: Sequence[Inconsistency]) -> list[Dataset]:
-    """The evidence without channels that are misread by an error of unit or sign, nor recordings of nothing else."""
+    """The dataset without channels that are misread by an error of unit or sign, nor recordings of nothing else."""
     aside = {(inconsistency.dataset.name, inconsistency.signal.channel) for inconsistency in inconsistencies}
-    left = [replace(e, signals=tuple(s for s in e.signals if (e.name, s.channel) not in aside)) for e in every]
-    return [e for e in left if e.signals] if aside else list(every)
+    remaining = [replace(e, signals=tuple(s for s in e.signals if (e.name, s.channel) not in aside)) for e in every]
+    return [e for e in remaining if e.signals] if aside else list(every)
 
 
-def inconsistency_evidence(found: Sequence[Aside]) -> str:
-    """What stands behind a verdict where channels were left aside; nothing where none was."""
-    return "".join(f" {inconsistency.says()}" for inconsistency in found)
+def inconsistency_sentences(found: Sequence[Aside]) -> str:
+    """Sentences behind a verdict on channels that were excluded; empty where none was."""
+    return "".join(f" {inconsistency.message()}" for inconsistency in found)
 
 
 def relative_scale(e: Dataset, s: Signal, made: np.ndarray) -> float | None:
     """How many times what is simulated a signal reads, where the two are alike; None if nowhere."""
     time, m, best = e.recording.time[s.rows], s.values, (0.0, 0.0)
     size = float(np.linalg.norm(m))
-    for shift in PLACES * e.shift_prior:
+    for shift in SHIFTS * e.shift_prior:
         p = np.interp(time - shift, time, made[s.rows])
         power = float(p @ p)
         if size > 0.0 and power > 0.0:
@@ -125,9 +125,9 @@ def relative_scale(e: Dataset, s: Signal, made: np.ndarray) -> float | None:
 
 
 def _usual_factor(channel: str, usual: float) -> float:
-    """Factor that is no slip's, of what the recordings of a channel usually are off by: what is missing makes it.
+    """Median factor of a channel's recordings that no unit error makes: missing physics does.
 
-    Where it is near no slip's, all of it.
+    Where it is near no unit error's, all of it.
     """
     known = (1.0, *(abs(cause) for cause, _ in _usual_unit_errors(describe(channel).unit)))
     near = min(known, key=lambda one: _log_distance(usual, one))
@@ -156,7 +156,7 @@ def _log_distance(factor: float, other: float) -> float:
 
 @cache
 def _usual_unit_errors(unit: str) -> tuple[tuple[float, str], ...]:
-    """(factor, what makes it) of each slip that a channel of this unit may have, the usual units first."""
+    """(factor, cause) of each error that a channel of this unit may have, the usual units first."""
     return tuple(_each(unit))
 
 

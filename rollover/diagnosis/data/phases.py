@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.result import Place
+from rollover.diagnosis.result import Location
 from rollover.diagnosis.settings import SETTINGS
+
+Phases = Sequence[Sequence[tuple[float, str]]]  # of each recording: when each phase begins, and its name
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.data.phases
@@ -64,11 +66,11 @@ def placed(
     names: Sequence[str],
     phases: Sequence[Sequence[tuple[float, str]]],
     found: Iterable[tuple[str, int, float, float, str]],
-) -> tuple[Place, ...]:
+) -> tuple[Location, ...]:
     """Places of equal share, of (channel, which recording, start s, end s, what it depends on)."""
     every = list(found)
     return tuple(
-        Place(
+        Location(
             recording=names[r],
             channel=channel,
             phase=phase_at(phases[r], start),
@@ -81,11 +83,11 @@ def placed(
     )
 
 
-def whole(e: Dataset, s: Signal, phases: Sequence[tuple[float, str]], share: float) -> Place:
+def whole(e: Dataset, s: Signal, phases: Sequence[tuple[float, str]], share: float) -> Location:
     """The whole of a signal as a place, with the phase in which it reaches furthest."""
     times = e.recording.time[s.rows]
     peak = float(times[int(np.abs(s.values - s.values[0]).argmax())])
-    return Place(
+    return Location(
         recording=e.name,
         channel=s.channel,
         phase=phase_at(phases, peak),

@@ -42,7 +42,7 @@ def pile(values: Array) -> float:
 
 
 def with_quantisation(dataset: Sequence[Dataset], recordings: Sequence[Recording]) -> list[Dataset]:
-    """The evidence with what rounding to the steps of its channels, as recorded, makes neighbouring samples share.
+    """The dataset with what rounding to the steps of its channels, as recorded, makes neighbouring samples share.
 
     Noise makes the error of each sample its own, and part of the noise: with s of it before a step d, Widrow's theorem
     leaves exp(-2 pi^2 s^2/d^2) of half a step in common. s is the least that any recording of a channel shows: beside

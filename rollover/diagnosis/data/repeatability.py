@@ -22,7 +22,7 @@ TUNING = SETTINGS.data.repeatability
 
 
 def with_scatter(found: Sequence[Dataset]) -> list[Dataset]:
-    """The evidence with the scatter of each channel, where any condition was recorded more than once."""
+    """The dataset with the scatter of each channel, where any condition was recorded more than once."""
     apart: dict[tuple[int, str], list[float]] = {}
     for group in condition_groups(found):
         for a, b in combinations(group, 2):

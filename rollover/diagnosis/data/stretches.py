@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.forward.forward_model import first_impact_of
+from rollover.diagnosis.forward.interface import first_impact_of
 from rollover.diagnosis.settings import SETTINGS
 
 LEAST = SETTINGS.noise.truncation.least_samples

@@ -17,12 +17,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Noise:
-    """Of one signal: samples, sigma (SI), autoregression; `loud` (n,), SI, where its own, and `weight` (n,), if any."""
+    """Of one signal: samples, sigma (SI), autoregression; `sd` (n,), SI, where its own, and `weight` (n,), if any."""
 
     count: int
     sigma: float
     ar: tuple[float, ...]
-    loud: Array | None
+    sd: Array | None
     weight: Array | None
 
 
@@ -30,14 +30,14 @@ class Whitening:
     """Whitens stacks of some signals, one after another."""
 
     def __init__(self, signals: Sequence[Noise]) -> None:
-        self.ends = np.cumsum([s.count for s in signals], dtype=np.int64)
+        self.stops = np.cumsum([s.count for s in signals], dtype=np.int64)
         self._sigma = np.array([s.sigma for s in signals], dtype=np.float64)
         self._ar = np.zeros((len(signals), max((len(s.ar) for s in signals), default=0)))
         self._orders = np.array([len(s.ar) for s in signals], dtype=np.int64)
         self._gains = np.array([grown(s.ar) for s in signals], dtype=np.float64)
         for k, s in enumerate(signals):
             self._ar[k, : len(s.ar)] = s.ar
-        self._loud = np.concatenate([np.zeros(s.count) if s.loud is None else s.loud for s in signals])
+        self._sd = np.concatenate([np.zeros(s.count) if s.sd is None else s.sd for s in signals])
         self._weight = np.concatenate([np.ones(s.count) if s.weight is None else s.weight for s in signals])
 
     def __call__(self, raw: Array) -> Array:
@@ -46,22 +46,22 @@ class Whitening:
             return np.stack([self(column) for column in np.ascontiguousarray(raw.T)], axis=1)
         out = np.empty(raw.size)
         into(
-            np.ascontiguousarray(raw, dtype=np.float64), self.ends, self._sigma, self._loud, self._weight,
+            np.ascontiguousarray(raw, dtype=np.float64), self.stops, self._sigma, self._sd, self._weight,
             self._orders, self._ar, self._gains, out,
         )  # fmt: skip
         return out
 
 
 @leaf
-def into(raw: Any, ends: Any, sigma: Any, loud: Any, weight: Any, orders: Any, ar: Any, gains: Any, out: Any) -> None:
+def into(raw: Any, stops: Any, sigma: Any, sd: Any, weight: Any, orders: Any, ar: Any, gains: Any, out: Any) -> None:
     """y_i = w g (x_i - sum_j a_j x_i-j), x = raw/sigma, or raw/loud where that is not 0, g of the autoregression."""
     first = 0
-    for k in range(ends.size):
-        last, order = ends[k], orders[k]
+    for k in range(stops.size):
+        last, order = stops[k], orders[k]
         for i in range(first, last):
             out[i] = raw[i] / sigma[k]
-            if loud[i] != 0.0:
-                out[i] = out[i] * sigma[k] / loud[i]
+            if sd[i] != 0.0:
+                out[i] = out[i] * sigma[k] / sd[i]
         if order > 0:
             for i in range(last - 1, first + order - 1, -1):
                 for j in range(order):

@@ -1,8 +1,8 @@
-"""What recordings are predicted to be, at any point: simulated once, remembered, and made ahead side by side."""
+"""Predictions of recordings at any point: simulated once, cached, and made ahead in parallel."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from rollover.diagnosis.fit.finite_differences import (
     stencil,
     time_derivative,
 )
-from rollover.diagnosis.fit.notebook import Memory
 from rollover.diagnosis.fit.parameterisation import Candidate, key_at, with_slices
 from rollover.diagnosis.forward.full_run import full_runs, made_ahead, perturbations_of
 from rollover.diagnosis.settings import SETTINGS
@@ -24,10 +23,11 @@ from rollover.system.processes import Children
 
 Array = NDArray[np.float64]
 NONE = np.zeros(0, dtype=np.int64)
+MEMORY = SETTINGS.fit.notebook
 
 
 class Simulations:
-    """Evidence with a memory of what was simulated: the same values are never simulated twice."""
+    """Datasets with a cache of simulations: the same values are never simulated twice."""
 
     def __init__(self, dataset: Sequence[Dataset]) -> None:
         self.dataset = tuple(dataset)
@@ -40,7 +40,7 @@ class Simulations:
         self._discontinuities: dict[tuple[object, ...], NDArray[np.int64]] = {}
 
     def with_noise_model(self, dataset: Sequence[Dataset]) -> None:
-        """Take the same recordings with another noise: nothing is simulated again."""
+        """Take the same recordings under another noise model: nothing is simulated again."""
         self.dataset = tuple(dataset)
         self._known = Memory()
 
@@ -179,3 +179,31 @@ class Simulations:
         e = self.dataset[r]
         discontinuities = self._discontinuities.get(key_at(r, *before, shift), NONE)
         return e.marginalised_beside(discontinuities)(e.worth(discontinuities) * e.whitened(d))
+
+
+class Memory:
+    """Arrays by key, of at most so many bytes: beyond that the older half of them is let go of, never the newest."""
+
+    def __init__(self, most: int = MEMORY.most_bytes) -> None:
+        self._most, self._bytes = most, 0
+        self._arrays: dict[Hashable, Array | None] = {}
+
+    def __len__(self) -> int:
+        return len(self._arrays)
+
+    def __contains__(self, key: Hashable) -> bool:
+        return key in self._arrays
+
+    def __getitem__(self, key: Hashable) -> Array | None:
+        return self._arrays[key]
+
+    def __setitem__(self, key: Hashable, array: Array | None) -> None:
+        self._arrays[key] = array
+        self._bytes += _size(array)
+        if self._bytes > self._most:
+            for old in list(self._arrays)[: len(self._arrays) // 2]:
+                self._bytes -= _size(self._arrays.pop(old))
+
+
+def _size(array: Array | None) -> int:
+    return 0 if array is None else array.nbytes

@@ -21,11 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.jobs import linearised
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import ResidualBlock, time_shift_step
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, time_shift_step
+from rollover.diagnosis.fit.local_search import linearised
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.noise.ensemble import heavy_tail, with_sample_weights, without_diverged
 from rollover.diagnosis.settings import SETTINGS
 
@@ -33,24 +32,23 @@ Array = NDArray[np.float64]
 TUNING = SETTINGS.fit.ensemble_mean
 
 
-def refined_under_scatter(problem: Problem, part: Step) -> Step:
-    """A step under the scatter of runs with its explanation, moved to where the mean of them is met best (D8).
+def fitted_to_ensemble_mean(problem: Problem, fitted: Fitted) -> Fitted:
+    """A fit under the scatter of its own runs, moved to where it meets their mean best (D8).
 
-    Slopes beside a jump lead astray, and so may clocks that a wrong place has bent: it is moved again until a step
-    would gain no more than chance, or little of what is left, and of all places on the way the one is kept whose mean
-    is met best. As it was if nothing can be simulated there; where runs do not scatter too. Its rivals are not put
-    under that scatter: that costs runs, see `Step.again`.
+    Slopes beside a jump mislead, and so do time shifts that a wrong start has biased: it is moved until a step would
+    gain no more than chance, or little of what is left, and of all points on the way the one that meets the mean best
+    is returned. As it was if nothing can be simulated there, or where runs do not scatter.
     """
-    with_ensemble_scatter(problem, part.fitted)
-    slopes = problem.again(part.fitted)
-    places = [slopes]
+    with_ensemble_scatter(problem, fitted)
+    slopes = problem.again(fitted)
+    points = [slopes]
     for _ in range(TUNING.most_steps):
-        here = places[-1]
+        here = points[-1]
         if not any(e.perturbed for e in problem.dataset):
             break
         dx = ensemble_mean_step(problem.dataset, here.blocks)
         if predicted_gain(here.blocks, dx) < max(
-            TUNING.least_gain, TUNING.least_gain_share * (here.left - sum(b.size for b in here.blocks))
+            TUNING.least_gain, TUNING.least_gain_share * (here.chi2 - sum(b.size for b in here.blocks))
         ):
             break
         there = _line_search(problem, here, np.clip(dx, -TUNING.longest_step, TUNING.longest_step))
@@ -59,14 +57,14 @@ def refined_under_scatter(problem: Problem, part: Step) -> Step:
         found = _with_scatter_at(problem, slopes, *there)
         if found is None:
             break
-        place, slopes = found
-        places.append(place)
-    best = places[0]
-    if len(places) > 1:
-        best = min(places, key=lambda f: ensemble_mean_misfit(problem, _reweighted_anew(problem, f))[0])
-    if best.x != places[-1].x:
+        point, slopes = found
+        points.append(point)
+    best = points[0]
+    if len(points) > 1:
+        best = min(points, key=lambda f: ensemble_mean_misfit(problem, _reweighted_anew(problem, f))[0])
+    if best.x != points[-1].x:
         with_ensemble_scatter(problem, best)
-    return replace(part.moved_to(problem.again(best)), base=problem.again(part.base))
+    return problem.again(best)
 
 
 def _reweighted_anew(problem: Problem, fitted: Fitted) -> Fitted:
@@ -110,14 +108,14 @@ def _line_search(problem: Problem, old: Fitted, dx: Array) -> tuple[Sequence[flo
         begun = [_moved_by(old, share * dx) for share in shares]
         problem.made_ahead((r, old.candidates, x) for x, _ in begun for r in range(len(old.blocks)))
         for x, shifts in begun:
-            left, clocks = _misfit_and_shifts(problem, old.candidates, x, shifts)
-            met.append((left, (x, clocks)))
-        if met[0][0] < old.left:
+            chi2, moved = _misfit_and_shifts(problem, old.candidates, x, shifts)
+            met.append((chi2, (x, moved)))
+        if met[0][0] < old.chi2:
             return met[0][1]
     least, best = min(met, key=lambda one: one[0])
-    if met[0][0] < TUNING.accepted_misfit * min(old.left, least):
+    if met[0][0] < TUNING.accepted_misfit * min(old.chi2, least):
         return met[0][1]
-    return best if least < old.left else None
+    return best if least < old.chi2 else None
 
 
 def _with_scatter_at(

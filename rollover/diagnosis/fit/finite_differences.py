@@ -42,15 +42,15 @@ def step_reduced(moved: Callable[[float], Array | None], step: float, far: float
     size = float(np.linalg.norm(found))
     if size <= TUNING.most_change * TUNING.target_change * far:
         return found / step
-    narrow = step * TUNING.target_change * far / size
-    closer = moved(narrow)
+    shorter = step * TUNING.target_change * far / size
+    closer = moved(shorter)
     if closer is None:
         return found / step
-    slope = closer / narrow
+    slope = closer / shorter
     if float(np.linalg.norm(slope)) * abs(step) < TUNING.doubted_ratio * size:
         return slope
-    other = moved(-narrow)
-    beyond = slope if other is None else -other / narrow
+    other = moved(-shorter)
+    beyond = slope if other is None else -other / shorter
     return beyond if TUNING.doubted_ratio * float(np.linalg.norm(beyond)) < float(np.linalg.norm(slope)) else slope
 
 
@@ -73,13 +73,13 @@ def adaptive_difference(
             break
         fd_step *= 2.0
     whole = _central_difference(sides)
-    (quiet, over), (loud, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
+    (quiet, over), (noisy, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
     # nothing at all on one side is where an effect ends, and no jump
     discontinuities = (
-        physical and widest > 0.0 and 0.0 < TUNING.discontinuity_ratio * float(quiet @ quiet) < float(loud @ loud)
+        physical and widest > 0.0 and 0.0 < TUNING.discontinuity_ratio * float(quiet @ quiet) < float(noisy @ noisy)
     )
     difference, over = (quiet, over) if discontinuities else (whole, sum(abs(over) for _, over in sides))
-    return (difference_beyond_chance(e, difference, chance) if owner.is_narrow and widest > 0.0 else difference) / over
+    return (difference_beyond_chance(e, difference, chance) if owner.is_local and widest > 0.0 else difference) / over
 
 
 def needs_wider_step(
@@ -216,7 +216,7 @@ def beside(
 
 
 def moved_to(at: Point, k: int, value: float) -> list[float]:
-    """Coordinates with the k-th one elsewhere, and what follows it along a valley."""
+    """Coordinates with the k-th one elsewhere, and what follows it along a ridge."""
     x, ridge = [float(v) for v in at[1]], ridge_at(at, k)
     if ridge is not None:
         follows, slope = ridge

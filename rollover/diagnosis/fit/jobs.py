@@ -1,6 +1,6 @@
-"""Fits as jobs: worked off here or in child processes, and kept in a file until the diagnosis is done.
+"""The executor of fits: here or in child processes; results stay in a file until the diagnosis is done.
 
-A job depends on nothing but the recordings, their noise and its own start, so that the answer is the same for any
+A task depends on nothing but the recordings, their noise and its own start, so that the answer is the same for any
 number of workers, and a diagnosis that was interrupted takes up what it had fitted.
 """
 
@@ -10,82 +10,28 @@ import hashlib
 import json
 import os
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar, cast
+from typing import Any, cast
 
-import numpy as np
-from numpy.typing import NDArray
-
-from rollover.diagnosis.fit.finite_differences import beside
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.local_search import polish, with_time_shift_search
-from rollover.diagnosis.fit.model_variants import in_other_form, with_fitted_shape
-from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.scan_jobs import serial_map
-from rollover.diagnosis.fit.threshold_scan import Stretch, with_threshold_traced
-from rollover.diagnosis.forward.failed_model import FailedModelError
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
+from rollover.diagnosis.fit.local_search import linearised, polish, with_time_shift_search
+from rollover.diagnosis.fit.model_variants import as_variant, with_fitted_shape
+from rollover.diagnosis.fit.tasks import Progress, R, T, Task, serial_map
+from rollover.diagnosis.fit.threshold_scan import with_threshold_traced
+from rollover.diagnosis.forward.interface import FailedModelError
 from rollover.system.processes import Children, Failure, begin_server, map_cases
 from rollover.system.writing import scratch
 
 WARM = "rollover.diagnosis.fit.warmup"
-Progress = Callable[[str], None]
-T = TypeVar("T")
-R = TypeVar("R")
-How = Literal["fit", "polish", "shape", "time", "trace"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Problem.fit`.
-
-    One of few `rounds` is a first look: it ends without slopes.
-    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
-    `form`, "time" tries out the time shifts, "trace" begins anew where it sets in, over a `stretch`. A shape or form
-    that comes nowhere near what the best fit `leaves` of each recording is not gone on with. `reused` as in
-    `Problem.fit`.
-    """
-
-    how: How = "fit"
-    candidates: tuple[Candidate, ...]
-    start: tuple[float, ...]
-    shifts: tuple[float, ...]
-    only: tuple[int, ...] | None = None
-    rounds: int | None = None  # as many as a whole fit may take
-    width: int = 0
-    fixed_shifts: bool = False
-    form: Candidate | None = None
-    stretch: Stretch | None = None
-    leaves: tuple[float, ...] | None = None
-    reused: tuple[NDArray[np.float64], ...] | None = None
-
-    def key(self, about: str) -> str:
-        """Hash of what is fitted and from where, with `about` for all else that it depends on."""
-        every = (*self.candidates, *(() if self.form is None else (self.form,)))
-        names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in every]
-        ways = self.how, self.only, self.rounds, self.width, self.fixed_shifts, self.stretch, self.leaves
-        shared = hashlib.sha256(repr((about, names, self.start, self.shifts, ways)).encode())
-        for J in self.reused or ():
-            shared.update(J.tobytes())
-        return shared.hexdigest()
-
-    @property
-    def recordings(self) -> tuple[int, ...]:
-        """Places of the recordings."""
-        return tuple(range(len(self.shifts))) if self.only is None else self.only
-
-    def beginning(self, fd_steps: Sequence[float]) -> Iterator[tuple[int, Sequence[Candidate], Sequence[float]]]:
-        """(recording, candidates, x) of the runs that a fit begins with."""
-        first = self.reused[0].shape[1] if self.reused else 0
-        return beside(self.recordings, self.candidates, self.start, fd_steps[min(self.width, len(fd_steps) - 1)], first)
 
 
 class Executor:
-    """Works off jobs: in this process, or in `workers` children where more than one is asked for.
+    """Works off tasks: in this process, or in `workers` children where more than one is asked for.
 
-    `notebook` is a file that holds what is done, by key; `close` removes it.
+    `notebook` is a file of finished fits by task key; `close` removes it.
     """
 
     def __init__(self, workers: int = 1, notebook: Path | None = None, about: str = "") -> None:
@@ -128,7 +74,7 @@ class Executor:
             self.notebook.unlink(missing_ok=True)
 
     def fits(self, problem: Problem, tasks: Sequence[Task], say: Progress = lambda _: None) -> list[Fitted | None]:
-        """Fits in the order of the jobs; None where nothing could be simulated."""
+        """Fits in the order of the tasks; None where nothing could be simulated."""
         about = self._about(problem)
         found: list[Fitted | None] = [None] * len(tasks)
         keys = [task.key(about) for task in tasks]
@@ -164,39 +110,41 @@ class Executor:
             ended(k, fitted)
         return found
 
-    def parallel_map(self, problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T]) -> list[R]:
-        """What a `look` at each thing tells, in their order: here, or spread over the children once they are there.
+    def parallel_map(self, problem: Problem, function: Callable[[Problem, T], R], items: Sequence[T]) -> list[R]:
+        """`function(problem, item)` of each, in their order: here, or spread over the children once they are there.
 
-        `look` and what it returns are sent to them: a function of a module, or a partial of one.
+        `function` and what it returns are sent to them: a function of a module, or a partial of one.
         """
-        if problem.effort.is_ensemble or len(things) < 2 or not self.is_there():
-            return serial_map(problem, look, things)
+        if problem.effort.is_ensemble or len(items) < 2 or not self.is_there():
+            return serial_map(problem, function, items)
         shared = self._shared_file(problem, self._about(problem))
-        shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
+        shares = [list(items)[k :: 2 * self.workers] for k in range(2 * self.workers)]
         found: dict[int, R] = {}
-        for start, (seen, made) in enumerate(self.each(_looked, [(shared, look, share) for share in shares if share])):
+        for start, (seen, made) in enumerate(
+            self.each(_mapped, [(shared, function, share) for share in shares if share])
+        ):
             problem.simulations += made
             found |= {start + 2 * self.workers * k: one for k, one in enumerate(seen)}
-        return [found[k] for k in range(len(things))]
+        return [found[k] for k in range(len(items))]
 
-    def each(self, function: Callable[[T], R], things: Sequence[T]) -> list[R]:
-        """What a function of a module makes of each thing, in their order: here, or in the children once there."""
+    def each(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+        """`function(item)` of each, in their order: here, or in the children once there."""
         if not self.is_there():
-            return [function(thing) for thing in things]
+            return [function(item) for item in items]
         found: dict[int, R] = {}
-        for outcome in map_cases(function, things, children=self.children):
+        for outcome in map_cases(function, items, children=self.children):
             if outcome.failure is not None:
                 name = getattr(function, "__name__", "a child").strip("_")
                 raise _failed(name, outcome.failure)
             found[outcome.index] = cast(R, outcome.value)
-        return [found[k] for k in range(len(things))]
+        return [found[k] for k in range(len(items))]
 
     def _about(self, problem: Problem) -> str:
-        """What all fits depend on beside their jobs."""
+        """What all fits depend on beside their tasks."""
         return f"{self.about} {_fingerprint(problem)}"
 
     def _shared_file(self, problem: Problem, about: str) -> Path:
-        """A file with the judge for children to read, once each: megabytes for each of a thousand jobs take long."""
+        """A file with the problem, which each child reads once: megabytes for each of a thousand tasks take long."""
         if self._folder is None:
             self._folder = self._scratch.enter_context(scratch())
         path = Path(self._folder, hashlib.sha256(f"{about} {problem.shifts}".encode()).hexdigest())
@@ -207,8 +155,8 @@ class Executor:
     def _note(self, key: str, fitted: Fitted | None) -> None:
         row: dict[str, Any] | None = None
         if fitted is not None:
-            form = dict(fitted.candidates[-1].form) if fitted.candidates else {}
-            row = {"x": list(fitted.x), "shifts": [b.shift for b in fitted.blocks], "form": form}
+            variant = dict(fitted.candidates[-1].variant) if fitted.candidates else {}
+            row = {"x": list(fitted.x), "shifts": [b.shift for b in fitted.blocks], "form": variant}
         self._done[key] = row
         if self.notebook is not None:
             self.notebook.parent.mkdir(parents=True, exist_ok=True)
@@ -229,7 +177,7 @@ def _no_link(path: str, flags: int) -> int:
 
 
 def work(problem: Problem, task: Task) -> Fitted | None:
-    """Work off one job."""
+    """The fit that a task asks for; None where nothing could be simulated."""
     if task.how == "fit":
         return problem.fit(
             task.candidates,
@@ -249,8 +197,8 @@ def work(problem: Problem, task: Task) -> Fitted | None:
     if task.how == "shape":
         return (
             with_fitted_shape(problem, begun, leaves)
-            if task.form is None
-            else in_other_form(problem, begun, task.form, leaves)
+            if task.variant is None
+            else as_variant(problem, begun, task.variant, leaves)
         )
     if task.stretch is not None:
         return with_threshold_traced(problem, begun, task.stretch)
@@ -259,7 +207,7 @@ def work(problem: Problem, task: Task) -> Fitted | None:
 
 
 def _fingerprint(problem: Problem) -> str:
-    """Hash of the recordings as they are held: their samples, their noise, and whether they may have strayed."""
+    """Hash of the datasets: samples, noise, and whether a heavy tail is allowed for runs that diverge."""
     total = hashlib.sha256(repr(problem.heavy_tailed).encode())
     for e in problem.dataset:
         total.update(repr((e.name, e.shift_prior)).encode())
@@ -273,29 +221,29 @@ def _fingerprint(problem: Problem) -> str:
     return total.hexdigest()
 
 
-_held: dict[Path, Problem] = {}  # in a child: what it simulated for the job before
+_held: dict[Path, Problem] = {}  # in a child: the problem of its last task, with what it simulated
 
 
 def _begun(shared: Path) -> None:
-    _kept(shared).fit((), (), rounds=1)
+    _problem_of(shared).fit((), (), rounds=1)
 
 
 def _worked(case: tuple[Path, Task]) -> tuple[Fitted | None, int]:
     shared, task = case
-    problem = _kept(shared)
+    problem = _problem_of(shared)
     before = problem.simulations
     return work(problem, task), problem.simulations - before
 
 
-def _looked(case: tuple[Path, Callable[[Problem, Any], Any], list[Any]]) -> tuple[list[Any], int]:
-    shared, look, things = case
-    problem = _kept(shared)
+def _mapped(case: tuple[Path, Callable[[Problem, Any], Any], list[Any]]) -> tuple[list[Any], int]:
+    shared, function, items = case
+    problem = _problem_of(shared)
     before = problem.simulations
-    return serial_map(problem, look, things), problem.simulations - before
+    return serial_map(problem, function, items), problem.simulations - before
 
 
-def _kept(shared: Path) -> Problem:
-    """The judge of a file, with what it simulated before."""
+def _problem_of(shared: Path) -> Problem:
+    """The problem of a file, with what this child has simulated for it."""
     if shared not in _held:
         _held.clear()
         _held[shared] = pickle.loads(shared.read_bytes())
@@ -306,35 +254,9 @@ def _rebuilt(problem: Problem, task: Task, row: dict[str, Any] | None) -> Fitted
     if row is None:
         return None
     candidates = list(task.candidates)
-    if candidates and row["form"] != candidates[-1].form:
-        candidates[-1] = next(c for c in candidates[-1].forms() if c.form == row["form"])
+    if candidates and row["form"] != candidates[-1].variant:
+        candidates[-1] = next(c for c in candidates[-1].variants() if c.variant == row["form"])
     elif len(row["x"]) > len(task.start):
         candidates[-1] = candidates[-1].whole()
     has_no_jacobian = task.how == "fit" and task.rounds is not None  # it ended without slopes
     return linearised(problem, candidates, row["x"], row["shifts"], task.recordings, no_jacobian=has_no_jacobian)
-
-
-def linearised(
-    problem: Problem,
-    candidates: Sequence[Candidate],
-    x: Sequence[float],
-    shifts: Sequence[float],
-    recordings: Sequence[int] | None = None,
-    *,
-    no_jacobian: bool = False,
-) -> Fitted | None:
-    """A fit to all recordings or some as it stands at x and these time shifts (s); None if nothing can be simulated.
-
-    A `no_jacobian` one has no slopes.
-    """
-    blocks: list[ResidualBlock] = []
-    use = range(len(shifts)) if recordings is None else recordings
-    fd_step = 0.0 if no_jacobian else problem.effort.fine
-    if not no_jacobian:
-        problem.simulate_neighbourhood(use, candidates, x, shifts, fd_step)
-    for r, shift in zip(use, shifts, strict=True):
-        block = problem.block(r, candidates, x, shift, fd_step)
-        if block is None:
-            return None
-        blocks.append(block)
-    return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))

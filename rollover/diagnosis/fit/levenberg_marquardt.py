@@ -91,8 +91,8 @@ class Problem(Simulations):
         fine, shifts = self.effort.fine, [b.shift for b in fitted.blocks]
         self.simulate_neighbourhood(range(len(shifts)), fitted.candidates, fitted.x, shifts, fine)
         blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, fine) for r, b in enumerate(fitted.blocks)]
-        kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
-        return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
+        updated = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
+        return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(updated))
 
     def recounted(self, fitted: Fitted) -> Fitted:
         """A fit where it stands by the slopes that it has, where nothing but what samples count has changed."""
@@ -154,7 +154,7 @@ class Problem(Simulations):
         marginalised = e.marginalised_beside(discontinuities)
         residual = marginalised(worth * (self.measured[r] - y))
         far = max(1.0, float(np.sqrt(np.mean(residual * residual)))) if 0.0 < fd_step <= self.effort.fine else np.inf
-        far = far if far < TUNING.local_slopes_below else np.inf  # from afar a wide step leads over ripples
+        far = far if far < TUNING.local_slopes_below else np.inf  # a wide step bridges local minima
 
         def off(end: Point) -> Array | None:
             return self.moved(r, (candidates, x), end, shift, None if self._fixed_shifts else slope)
@@ -339,21 +339,21 @@ class Problem(Simulations):
             has_no_jacobian = no_jacobian and (last or turn + 1 == rounds)
             fd_step = 0.0 if has_no_jacobian else self.effort.fine if last else fd_steps[width]
             # what is held already moves little: its slopes are worked out anew only where the search narrows, or where
-            # they lead astray or not far, as those of another place along a valley do; where a run is dear a short fit
+            # they lead astray or not far, as those of another point along a ridge do; where a run is dear a short fit
             # keeps all that predicted well, and another ends with those of a place beside it
             slow = gain < TUNING.reuse_least_share * due or gain < TUNING.reuse_least_gain * best
             anew = fresh or (slow and not self.effort.is_ensemble)
-            kept = 0 if anew else len(x) if no_jacobian and self.effort.is_ensemble and not slow else fixed
+            keep = 0 if anew else len(x) if no_jacobian and self.effort.is_ensemble and not slow else fixed
             if last and self.effort.is_ensemble and linearised_at is not None and self.is_beside(x, linearised_at):
-                kept = len(x)
+                keep = len(x)
             elif anew and not has_no_jacobian:
                 linearised_at = x
-            borrowed = self.effort.is_ensemble and ((borrowed and not anew) or 0 < kept == len(x))
+            borrowed = self.effort.is_ensemble and ((borrowed and not anew) or 0 < keep == len(x))
             if not has_no_jacobian:
-                self.simulate_neighbourhood(use, candidates, x, shifts, fd_step, kept)
+                self.simulate_neighbourhood(use, candidates, x, shifts, fd_step, keep)
             again = [
                 self.block(
-                    r, candidates, x, s, fd_step, None if not kept or has_no_jacobian else block.unweighted_J[:, :kept]
+                    r, candidates, x, s, fd_step, None if not keep or has_no_jacobian else block.unweighted_J[:, :keep]
                 )
                 for r, s, block in zip(use, shifts, blocks, strict=True)
             ]
@@ -390,10 +390,10 @@ class Problem(Simulations):
             found = [self._trial_block(r, candidates, there, b.shift) for r, b in each if b is not None]
             if there == trial or any(b is None for b in found):
                 break
-            left = total_of([b for b in found if b is not None])
-            if left >= total:
+            chi2 = total_of([b for b in found if b is not None])
+            if chi2 >= total:
                 break
-            trial, after, total = there, list(found), left
+            trial, after, total = there, list(found), chi2
         return trial, after, total
 
 

@@ -100,7 +100,7 @@ class ResidualBlock:
 
 @dataclass(frozen=True, kw_only=True)
 class Fitted:
-    """Effects fitted to recordings: coordinates, blocks there, and what is left, sum of squares over the noise.
+    """Effects fitted to recordings: coordinates x (p,), linearised residuals there, and their sum of squares `chi2`.
 
     `cross_validated` is what runs leave of each recording where the fit to all other conditions would be, if they were
     made.
@@ -118,7 +118,7 @@ class Fitted:
 
     @property
     def first(self) -> int:
-        """Place of the first effect among the candidates."""
+        """Index of the first effect among the candidates."""
         return len(self.candidates) - len(self.effects)
 
     @property
@@ -132,8 +132,8 @@ class Fitted:
         return total_of(self.blocks)
 
     @property
-    def left(self) -> float:
-        """Sum over the recordings of (D1) at its minimum."""
+    def chi2(self) -> float:
+        """Sum over the recordings of (D1) at its minimum, squares over the noise: by noise alone about one a sample."""
         return sum(b.normal()[2] for b in self.blocks)
 
     @property
@@ -197,3 +197,8 @@ def without_shift_direction(vectors: Array, block: ResidualBlock) -> Array:
     s = block.slope
     shrink = (1.0 - np.sqrt(block.prior**-2 / block.weight)) / max(float(s @ s), 1e-300)
     return np.asarray(vectors - shrink * np.outer(s, s @ vectors))
+
+
+def is_at_bound(fitted: Fitted) -> bool:
+    """Whether a number of the last effect stands at an end of its range."""
+    return any(at_an_end(v) for v in fitted.own)

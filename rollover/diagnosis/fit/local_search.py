@@ -1,4 +1,4 @@
-"""Fits followed on where differences mislead: along crooked valleys, over edges in time, behind cliffs."""
+"""Local searches where finite differences mislead: along curved ridges, over edges in time, beyond discontinuities."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.fit.local_search
-SPREAD = (np.arange(TUNING.coarse_shapes) + 0.5) / TUNING.coarse_shapes  # places of a shape that goes along with them
-SCANNED = (np.arange(TUNING.fine_shapes) + 0.5) / TUNING.fine_shapes  # places of a shape
+SPREAD = (
+    np.arange(TUNING.coarse_secondary) + 0.5
+) / TUNING.coarse_secondary  # places of a shape that goes along with them
+SCANNED = (np.arange(TUNING.fine_secondary) + 0.5) / TUNING.fine_secondary  # places of a shape
 
 
-def left_at(
+def chi2_at(
     problem: Problem,
     candidates: Sequence[Candidate],
     x: Sequence[float],
@@ -52,17 +54,17 @@ def blocks_at(
 def ranked_by_misfit(
     problem: Problem,
     candidates: Sequence[Candidate],
-    places: Sequence[tuple[float, ...]],
+    points: Sequence[tuple[float, ...]],
     shifts: Sequence[float],
     only: Sequence[int] | None = None,
 ) -> list[tuple[float, ...]]:
     """Those places that can be simulated, the one that leaves least of all recordings or `only` some first."""
-    met = [(there, x) for x in places if (there := left_at(problem, candidates, x, shifts, only)) is not None]
+    met = [(there, x) for x in points if (there := chi2_at(problem, candidates, x, shifts, only)) is not None]
     return [x for _, x in sorted(met)]
 
 
 def polish(problem: Problem, fitted: Fitted, size: float = 0.02, most: int = 45) -> Fitted:
-    """Follow a crooked valley by a simplex: where a threshold is crossed, differences mislead; never worse."""
+    """Follow a curved ridge by a simplex: where a threshold is crossed, differences mislead; never worse."""
     from scipy.optimize import minimize
 
     shifts = [b.shift for b in fitted.blocks]
@@ -70,7 +72,7 @@ def polish(problem: Problem, fitted: Fitted, size: float = 0.02, most: int = 45)
     def left(x: Array) -> float:
         inside = [float(v) for v in np.clip(x, 0.0, 1.0)]
         out = float(np.sum(np.abs(x - np.array(inside))))
-        there = left_at(problem, fitted.candidates, inside, shifts)
+        there = chi2_at(problem, fitted.candidates, inside, shifts)
         return 1e300 if there is None else there * (1.0 + out)
 
     start = np.array(fitted.x)
@@ -81,7 +83,7 @@ def polish(problem: Problem, fitted: Fitted, size: float = 0.02, most: int = 45)
         left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": most, "xatol": 1e-4}
     )
     again = problem.fit(fitted.candidates, np.clip(found.x, 0.0, 1.0), rounds=3, shifts=shifts, width=2)
-    return again if again is not None and again.left < fitted.left else fitted
+    return again if again is not None and again.chi2 < fitted.chi2 else fitted
 
 
 def grid_scan(fitted: Fitted) -> list[tuple[float, ...]]:
@@ -103,10 +105,12 @@ def frequency_scan(last: Candidate, own: Sequence[float]) -> tuple[Candidate, li
 
     One that was fitted beside a wrong frequency hardly rings any more: what it rings by is not to be seen from there.
     """
-    whole = replace(last.whole(), along=tuple(last.shapes))
+    whole = replace(last.whole(), along=tuple(last.secondary))
     firsts = np.clip(own[0] + TUNING.frequency_half_width * np.linspace(-1.0, 1.0, TUNING.frequency_count), 0.0, 1.0)
-    shapes = itertools.product(*(SPREAD for _ in last.shapes))
-    return whole, [(float(a), b, *map(float, shape)) for shape in shapes for a in firsts for b in TUNING.light_damping]
+    secondaries = itertools.product(*(SPREAD for _ in last.secondary))
+    return whole, [
+        (float(a), b, *map(float, shape)) for shape in secondaries for a in firsts for b in TUNING.light_damping
+    ]
 
 
 def separate_minima(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
@@ -131,25 +135,25 @@ def starts_along_shape(last: Candidate, x: Sequence[float]) -> list[tuple[float,
 
 
 def smallest_misfit(
-    problem: Problem, thing: tuple[Sequence[Candidate], Sequence[tuple[float, ...]]], *, shifts: Sequence[float]
+    problem: Problem, item: tuple[Sequence[Candidate], Sequence[tuple[float, ...]]], *, shifts: Sequence[float]
 ) -> tuple[float, tuple[float, ...]] | None:
     """What is left of all recordings at that of some places where it is least, and this; None if all runs fail."""
-    candidates, places = thing
+    candidates, points = item
     least, best = np.inf, None
-    for x in places:
-        left = 0.0
+    for x in points:
+        chi2 = 0.0
         for r, shift in enumerate(shifts):
             block = problem.block(r, candidates, x, shift, 0.0)
-            left += np.inf if block is None else block.normal()[2]
-            if left >= least:
+            chi2 += np.inf if block is None else block.normal()[2]
+            if chi2 >= least:
                 break
         else:
-            least, best = left, x
+            least, best = chi2, x
     return None if best is None else (least, best)
 
 
 def with_time_shift_search(problem: Problem, fitted: Fitted) -> Fitted:
-    """The fit with each time shift tried out to either side: edges make its slope crooked; never worse.
+    """The fit with each time shift scanned to either side: edges bias its slope; never worse.
 
     Where one channel has a clock of its own all shifts are tried against that first: the edges of the channel stay.
     """
@@ -160,7 +164,7 @@ def with_time_shift_search(problem: Problem, fitted: Fitted) -> Fitted:
         blocks = [b if b is None else _tried(problem, r, best.candidates, x, b) for r, b in enumerate(moved)]
         shifts = [s if b is None else b.shift for s, b in zip(shifts, blocks, strict=True)]
         again = problem.fit(best.candidates, x, rounds=3, shifts=shifts, width=2)
-        if again is None or again.left > best.left - TUNING.least_gain:
+        if again is None or again.chi2 > best.chi2 - TUNING.least_gain:
             break
         best = again
     return best
@@ -171,9 +175,9 @@ def ended(problem: Problem, fitted: Fitted) -> Fitted:
     best = fitted
     for _ in range(TUNING.repeats):
         again = problem.fit(best.candidates, best.x, shifts=[b.shift for b in best.blocks], width=2, finely=True)
-        if again is None or again.left > best.left:
+        if again is None or again.chi2 > best.chi2:
             break
-        is_there = again.left > best.left - TUNING.least_gain
+        is_there = again.chi2 > best.chi2 - TUNING.least_gain
         best = again
         if is_there:
             break
@@ -182,7 +186,7 @@ def ended(problem: Problem, fitted: Fitted) -> Fitted:
 
 def _against(problem: Problem, fitted: Fitted) -> tuple[tuple[float, ...], list[float]]:
     """Coordinates, and time shifts (s) of all, moved against the clock of each channel that has one of its own."""
-    best, left = (fitted.x, [b.shift for b in fitted.blocks]), fitted.total
+    best, chi2 = (fitted.x, [b.shift for b in fitted.blocks]), fitted.total
     for c, own in with_slices(fitted.candidates):
         if c.id != "sensor-clock-offset":
             continue
@@ -193,8 +197,8 @@ def _against(problem: Problem, fitted: Fitted) -> tuple[tuple[float, ...], list[
                 x, shifts = (*best[0][:k], moved, *best[0][k + 1 :]), [s + d for s in best[1]]
                 blocks = blocks_at(problem, fitted.candidates, x, shifts, clock=False) if 0.0 < moved < 1.0 else None
                 there = np.inf if blocks is None else sum(b.total for b in blocks)
-                if there < left:
-                    best, left = (x, shifts), there
+                if there < chi2:
+                    best, chi2 = (x, shifts), there
                     break
             else:
                 step *= TUNING.shift_step_factor
@@ -276,3 +280,29 @@ def without_effect(
     x, shifts = [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks]
     reused = [b.unweighted_J[:, columns] for b in fitted.blocks] if problem.effort.is_ensemble else None
     return problem.fit(rest, x, rounds=rounds, shifts=shifts, no_jacobian=no_jacobian, reused=reused)
+
+
+def linearised(
+    problem: Problem,
+    candidates: Sequence[Candidate],
+    x: Sequence[float],
+    shifts: Sequence[float],
+    recordings: Sequence[int] | None = None,
+    *,
+    no_jacobian: bool = False,
+) -> Fitted | None:
+    """A fit to all recordings or some as it stands at x and these time shifts (s); None if nothing can be simulated.
+
+    A `no_jacobian` one has no slopes.
+    """
+    blocks: list[ResidualBlock] = []
+    use = range(len(shifts)) if recordings is None else recordings
+    fd_step = 0.0 if no_jacobian else problem.effort.fine
+    if not no_jacobian:
+        problem.simulate_neighbourhood(use, candidates, x, shifts, fd_step)
+    for r, shift in zip(use, shifts, strict=True):
+        block = problem.block(r, candidates, x, shift, fd_step)
+        if block is None:
+            return None
+        blocks.append(block)
+    return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))

@@ -16,7 +16,7 @@ from rollover.diagnosis.settings import SETTINGS
 
 TUNING = SETTINGS.fit.model_variants
 # of a coordinate: where a threshold of another form may lie
-BESIDE_FORM = np.linspace(TUNING.threshold_low, TUNING.threshold_high, TUNING.threshold_count)
+BESIDE_VARIANT = np.linspace(TUNING.threshold_low, TUNING.threshold_high, TUNING.threshold_count)
 
 
 def with_fitted_shape(problem: Problem, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
@@ -26,20 +26,20 @@ def with_fitted_shape(problem: Problem, f: Fitted, leaves: Sequence[float]) -> F
     the way the usual shape may be met better than before: what is abrupt is a cliff that a smooth one leads around. It
     is returned where the other does not pay.
     """
-    if not f.candidates[-1].shapes:
+    if not f.candidates[-1].secondary:
         return None
     last, at = f.candidates[-1], len(f.x) - len(f.candidates[-1].search)
-    along = replace(last.whole(), along=tuple(last.shapes))
-    places = [(*f.x[:at], *start) for start in last.with_secondary(f.x[at:])]
-    found = _best_from(problem, f, along, places, leaves)
+    along = replace(last.whole(), along=tuple(last.secondary))
+    points = [(*f.x[:at], *start) for start in last.with_secondary(f.x[at:])]
+    found = _best_from(problem, f, along, points, leaves)
     if found is None:
         return None
-    if found.left > f.left:  # the few led to where the others are not met: all of them, from where the fit stands
-        onward = problem.fit((*f.candidates[:-1], along), places[0], shifts=[b.shift for b in f.blocks])
-        found = min((one for one in (found, onward) if one is not None), key=lambda one: one.left)
-    if found.left > _reach_of_all(f, leaves):
+    if found.chi2 > f.chi2:  # the few led to where the others are not met: all of them, from where the fit stands
+        onward = problem.fit((*f.candidates[:-1], along), points[0], shifts=[b.shift for b in f.blocks])
+        found = min((one for one in (found, onward) if one is not None), key=lambda one: one.chi2)
+    if found.chi2 > _extent_of_all(f, leaves):
         return None
-    found = found if is_noise(found) or found.left > TUNING.no_ridge_above * sum(leaves) else polish(problem, found)
+    found = found if is_noise(found) or found.chi2 > TUNING.no_ridge_above * sum(leaves) else polish(problem, found)
     (whole, x), shifts = found.candidates[-1].plain(found.own), [b.shift for b in found.blocks]
     variant = problem.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
     own = dict(zip(found.candidates[-1].search, found.own, strict=True))
@@ -48,12 +48,12 @@ def with_fitted_shape(problem: Problem, f: Fitted, leaves: Sequence[float]) -> F
         return variant or usual
     return (
         usual
-        if usual.left < variant.left + enough(variant.left, sum(b.residual.size for b in variant.blocks))
+        if usual.chi2 < variant.chi2 + enough(variant.chi2, sum(b.residual.size for b in variant.blocks))
         else variant
     )
 
 
-def in_other_form(problem: Problem, f: Fitted, last: Candidate, leaves: Sequence[float]) -> Fitted | None:
+def as_variant(problem: Problem, f: Fitted, last: Candidate, leaves: Sequence[float]) -> Fitted | None:
     """The fit with its last effect in another form, begun where it leaves least.
 
     A threshold lies elsewhere in another form; what is fitted instead of another number is looked for over its range.
@@ -62,28 +62,28 @@ def in_other_form(problem: Problem, f: Fitted, last: Candidate, leaves: Sequence
     axes: list[list[float]] = []
     for name, search in last.search.items():
         there = coordinate(known[name], search) if name in known else None
-        several = [there + float(d) for d in BESIDE_FORM] if there is not None and not axes else [there]
+        several = [there + float(d) for d in BESIDE_VARIANT] if there is not None and not axes else [there]
         axes.append(
-            list(TUNING.new_places) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0]
+            list(TUNING.new_points) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0]
         )
-    places = [(*f.x[:at], *own) for own in itertools.product(*axes)]
-    met = ranked_by_misfit(problem, (*f.candidates[:-1], last), places, shifts, representative_recordings(f))
+    points = [(*f.x[:at], *own) for own in itertools.product(*axes)]
+    met = ranked_by_misfit(problem, (*f.candidates[:-1], last), points, shifts, representative_recordings(f))
     found = _best_from(problem, f, last, met[: 2 * SETTINGS.fit.local_search.starts], leaves)
-    return found if found is not None and found.left < _reach_of_all(f, leaves) else None
+    return found if found is not None and found.chi2 < _extent_of_all(f, leaves) else None
 
 
-def enough(left: float, size: int) -> float:
+def enough(chi2: float, size: int) -> float:
     """The gain that pays for a shape where so much is left of so many samples."""
-    return TUNING.least_gain * max(1.0, left / size)
+    return TUNING.least_gain * max(1.0, chi2 / size)
 
 
 def is_noise(fitted: Fitted) -> bool:
     """Whether a fit needs no further search."""
-    return fitted.left < SETTINGS.fit.levenberg_marquardt.noise_left**2 * sum(b.residual.size for b in fitted.blocks)
+    return fitted.chi2 < SETTINGS.fit.levenberg_marquardt.noise_left**2 * sum(b.residual.size for b in fitted.blocks)
 
 
 def _best_from(
-    problem: Problem, f: Fitted, last: Candidate, places: Sequence[tuple[float, ...]], leaves: Sequence[float]
+    problem: Problem, f: Fitted, last: Candidate, points: Sequence[tuple[float, ...]], leaves: Sequence[float]
 ) -> Fitted | None:
     """The best fit with another last effect from some places.
 
@@ -95,7 +95,7 @@ def _best_from(
     candidates, few = (*f.candidates[:-1], last), representative_recordings(f)
     at = [f.blocks[r].shift for r in few]
     short = [
-        problem.fit(candidates, x, rounds=TUNING.short_rounds, shifts=at, only=few, no_jacobian=True) for x in places
+        problem.fit(candidates, x, rounds=TUNING.short_rounds, shifts=at, only=few, no_jacobian=True) for x in points
     ]
     # fitted alone these soon leave less than beside all others
     own = sum(f.blocks[r].total for r in few)
@@ -123,17 +123,17 @@ def _best_from(
     ]
     best: Fitted | None = None
     done: list[Fitted] = []
-    most = _reach_of_all(f, leaves)
+    most = _extent_of_all(f, leaves)
     for one in sorted((one for one in again if one is not None), key=lambda one: one.total):
         if one.total > most:
             return best or one
         if any(_is_same_minimum(one, other, TUNING.meeting_distance) for other in done) or (
-            best and one.total > TUNING.followed_misfit * best.left
+            best and one.total > TUNING.followed_misfit * best.chi2
         ):
             continue
         done.append(one)
         ended = problem.fit(candidates, one.x, shifts=[b.shift for b in one.blocks])
-        best = min((f for f in (best, ended) if f is not None), key=lambda f: f.left, default=None)
+        best = min((f for f in (best, ended) if f is not None), key=lambda f: f.chi2, default=None)
         if best is not None and is_noise(best):
             break
     return best
@@ -144,11 +144,11 @@ def largest_useful_misfit(leaves: Sequence[float], size: int, part: float) -> fl
 
     As far again from the noise as that is, or `part` of the samples.
     """
-    left = sum(leaves)
-    return left + max((SETTINGS.fit.local_search.abandon_above - 1.0) * (left - size), part * size)
+    chi2 = sum(leaves)
+    return chi2 + max((SETTINGS.fit.local_search.abandon_above - 1.0) * (chi2 - size), part * size)
 
 
-def _reach_of_all(f: Fitted, leaves: Sequence[float]) -> float:
+def _extent_of_all(f: Fitted, leaves: Sequence[float]) -> float:
     """The same of a fit to all recordings that was gone on with."""
     return largest_useful_misfit(leaves, sum(b.residual.size for b in f.blocks), TUNING.followed_excess)
 
@@ -161,6 +161,6 @@ def _is_same_ridge(one: Fitted, other: Fitted) -> bool:
     )
 
 
-def _is_same_minimum(one: Fitted, other: Fitted, within: float = TUNING.same_place) -> bool:
+def _is_same_minimum(one: Fitted, other: Fitted, within: float = TUNING.same_point) -> bool:
     """Whether two fits ended in one place."""
     return max(abs(a - b) for a, b in zip(one.x, other.x, strict=True)) < within

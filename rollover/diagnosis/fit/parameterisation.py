@@ -1,4 +1,4 @@
-"""An effect as it is looked for: what is fitted of it, over which ranges, and where looks and fits begin."""
+"""A candidate effect: which parameters are fitted, over which ranges, and where scans and fits begin."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.forward.forward_model import EDGES
+from rollover.diagnosis.forward.interface import EDGES
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, Search, nth
 
@@ -31,14 +31,15 @@ class Candidate:
     family: str
     search: Mapping[str, Search]
     channel: str | None = None
-    null: tuple[float | None, ...] | None = None  # coordinates that change nothing; given where a place costs a run
-    shapes: Mapping[str, Search] = field(default_factory=dict)  # fitted only where what is left asks for them
+    null: tuple[float | None, ...] | None = None  # null coordinates, None where a parameter has none; of full runs only
+    # secondary parameters: fitted only where the misfit asks for them
+    secondary: Mapping[str, Search] = field(default_factory=dict)
     fixed: Mapping[str, Any] = field(default_factory=dict)  # parameters that are not fitted
-    form: Mapping[str, float] = field(default_factory=dict)  # those of them that make another form of the same effect
+    variant: Mapping[str, float] = field(default_factory=dict)  # fixed parameters that make it a variant
     own: Mapping[str, float] = field(default_factory=dict)  # the scenario's values, where no number is an effect's null
-    places: tuple[tuple[float, ...], ...] = ()  # where it is looked at, if not wherever its `probes` are
-    along: tuple[str, ...] = ()  # of a fitted shape, at whose default all other coordinates are held: `Effect.reshaped`
-    # no effect: what any explanation is fitted beside, see `Fitted.effects`; fits begin from its `places` as well
+    points: tuple[tuple[float, ...], ...] = ()  # points that are scanned, if not `scan_points`
+    along: tuple[str, ...] = ()  # of a secondary parameter, at whose default all others are held: `Effect.reshaped`
+    # no effect: what any explanation is fitted beside, see `Fitted.effects`; fits begin from its `points` as well
     is_baseline: bool = False
 
     @property
@@ -49,8 +50,8 @@ class Candidate:
 
     @cached_property
     def token(self) -> tuple[object, ...]:
-        """What tells the meaning of its coordinates from that of any other's."""
-        return (self.key, len(self.search), self.along, *self.form.items())
+        """Identity of its coordinates: candidates with the same token mean the same by them."""
+        return (self.key, len(self.search), self.along, *self.variant.items())
 
     @property
     def is_placed(self) -> bool:
@@ -58,13 +59,13 @@ class Candidate:
         return self.null is not None and len(self.search) > 1 and None in self.null
 
     @property
-    def is_narrow(self) -> bool:
-        """Whether it tells only near its place."""
+    def is_local(self) -> bool:
+        """Whether it acts only near one point of its range."""
         return bool(EFFECTS[self.id].narrow)
 
     @property
     def is_discontinuous(self) -> bool:
-        """Whether it does something at the least of its strength already."""
+        """Whether it acts at the least of its strength already."""
         return EFFECTS[self.id].is_discontinuous
 
     @property
@@ -74,21 +75,21 @@ class Candidate:
 
     @property
     def has_secondary(self) -> bool:
-        """Whether it is fitted in another shape or form than its usual one."""
-        return bool(self.form) or not set(self.search).isdisjoint(EFFECTS[self.id].shapes)
+        """Whether secondary parameters are fitted too, or a variant of it is."""
+        return bool(self.variant) or not set(self.search).isdisjoint(EFFECTS[self.id].shapes)
 
     def is_fine(self, k: int) -> bool:
-        """Whether the k-th parameter is that place: looked at in many, and over less about each."""
-        return self.is_narrow and list(self.search)[k] == "travel"
+        """Whether the k-th parameter says where a local effect acts: scanned finely, over less about each point."""
+        return self.is_local and list(self.search)[k] == "travel"
 
     def ridge(self, x: Sequence[float], k: int) -> tuple[int, float] | None:
-        """Which coordinate follows the k-th one along the valley of a narrow effect at x, and how fast; else None.
+        """Which coordinate follows the k-th one along the ridge of a local effect at x, and how fast; else None.
 
         At a tilt theta a load slides by s, proportional to tan theta - mu, until a given moment:
         d ln s / d mu = -1/(tan theta - mu). Along that it meets its wall no sooner and no later.
         """
         names = list(self.search)
-        if not self.is_narrow or names[k] != "friction":
+        if not self.is_local or names[k] != "friction":
             return None
         travel, friction = self.search["travel"], self.search["friction"]
         slope = -(friction.high - friction.low) / (TUNING.sliding_tilt - physical(x[k], friction))
@@ -101,7 +102,7 @@ class Candidate:
         """
         key = nth(self.id, number)
         found: dict[str, Any] = {} if self.channel is None else {f"effects.{key}.channel": self.channel}
-        found |= {f"effects.{key}.{name}": value for name, value in (*self.fixed.items(), *self.form.items())}
+        found |= {f"effects.{key}.{name}": value for name, value in (*self.fixed.items(), *self.variant.items())}
         return found | {f"effects.{key}.{name}": value for name, value in self.values(x).items()}
 
     def values(self, x: Sequence[float]) -> dict[str, float]:
@@ -112,7 +113,7 @@ class Candidate:
         return dict(found)
 
     def strength(self, x: Sequence[float]) -> float:
-        """How many times as strong as it usually is, by the parameter that is furthest from changing nothing."""
+        """How many times as strong as it usually is, by the parameter that is furthest from its null value."""
         usual, nulls = EFFECTS[self.id](), EFFECTS[self.id].null
         found = []
         for name, value in self.values(x).items():
@@ -122,7 +123,7 @@ class Candidate:
         return max(found, default=1.0)
 
     def starts(self) -> list[tuple[float, ...]]:
-        """Coordinates to look at first; the first of two parameters, a depth or a frequency, in the finer steps."""
+        """Coordinates of a start grid; the first of two parameters, a depth or a frequency, in the finer steps."""
         if self.null is not None:
             return self._beside(self.null)
         axes = []
@@ -141,7 +142,7 @@ class Candidate:
         return list(itertools.product(*axes))
 
     def _beside(self, null: tuple[float | None, ...]) -> list[tuple[float, ...]]:
-        """Few coordinates: a step to either side of what changes nothing, places spread where nothing is known to."""
+        """Few coordinates: a step to either side of the null value, a spread of points where there is none."""
         known = [k for k, n in enumerate(null) if n is not None]
         if len(known) == len(null):
             at = [float(n) for n in null if n is not None]
@@ -149,25 +150,25 @@ class Candidate:
             beside = [tuple(a + (d if a + d < 1.0 else -d) * (j == k) for j, a in enumerate(at)) for k, d in steps]
             # what the scenario has may be far above what ever acts: a yield force, a stop
             is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
-            return [*beside, *((x,) for x in TUNING.limit_places if is_limit)]
-        axes, narrow = [], EFFECTS[self.id].narrow
+            return [*beside, *((x,) for x in TUNING.limit_points if is_limit)]
+        axes, local = [], EFFECTS[self.id].narrow
         for n, (name, search) in zip(null, self.search.items(), strict=True):
             if n is not None:
                 axes.append([min(n + 2.0 * TUNING.run_step, 0.9)])
-            elif name in narrow:
-                axes.append(list(narrow[name]))
+            elif name in local:
+                axes.append(list(local[name]))
             elif EFFECTS[self.id].null.get(name) == 0.0 or any(len(a) > 1 for a in axes):
                 # a strength, or more than one place: what is usual shows the direction
                 usual = coordinate(getattr(EFFECTS[self.id](), name), search)
                 axes.append([min(max(usual, TUNING.run_step), 1.0 - TUNING.run_step)])
             else:
-                axes.append(list(TUNING.length_places))
+                axes.append(list(TUNING.length_points))
         return list(itertools.product(*axes))
 
     def strong(self) -> list[tuple[float, ...]]:
-        """Coordinates where the effect is strong, one parameter at a time, and its `probes`; none where runs are cheap.
+        """Coordinates where the effect is strong, one parameter at a time, and `scan_points`; none of drops.
 
-        Where it acts, if that is a parameter, is spread as in `probes`; what begins at no strength at all has one end.
+        Where it acts, if that is a parameter, is spread as there; what begins at no strength at all has one end.
         """
         if self.null is None:
             return []
@@ -185,8 +186,8 @@ class Candidate:
                 (k, 1.0, TUNING.strong_shares[-1], 0.0) for k, name in enumerate(self.search) if nulls.get(name) == 0.0
             ][:1]
         found = list(beside)
-        for place in beside:
-            usual = [p if n is None else n for p, n in zip(place, self.null, strict=True)]
+        for point in beside:
+            usual = [p if n is None else n for p, n in zip(point, self.null, strict=True)]
             found += [(*usual[:k], n + way * (end - n), *usual[k + 1 :]) for k, end, way, n in ways]
         return list(dict.fromkeys(found))
 
@@ -203,30 +204,30 @@ class Candidate:
         return replace(self, along=names), coordinates(values, self.search)
 
     def whole(self) -> Candidate:
-        """The same effect with its shape fitted too."""
-        return replace(self, search={**self.search, **self.shapes}, shapes={})
+        """The same effect with its secondary parameters fitted too."""
+        return replace(self, search={**self.search, **self.secondary}, secondary={})
 
-    def forms(self) -> list[Candidate]:
-        """The same effect in its other forms, which are not fitted; none where it has a form or its shape is fitted."""
+    def variants(self) -> list[Candidate]:
+        """Variants of the same effect; none of a variant, or where secondary parameters are fitted."""
         if self.has_secondary:
             return []
         found = []
         for form in EFFECTS[self.id].forms:
             search = {name: s for name, s in self.search.items() if name not in form.fixed}
-            found.append(replace(self, form=form.fixed, search={**search, **form.search}, shapes={}))
+            found.append(replace(self, variant=form.fixed, search={**search, **form.search}, secondary={}))
         return found
 
     def with_secondary(self, x: Sequence[float]) -> list[tuple[float, ...]]:
-        """Coordinates of `whole` at which its fit may begin: the shape's default, and others."""
+        """Coordinates of `whole` at which its fit may begin: the defaults of the secondary parameters, and others."""
         kind: Any = EFFECTS[self.id]()
-        default = [_begun(getattr(kind, n), s) for n, s in self.shapes.items()]
-        places = [tuple(default), *itertools.product(*[TUNING.shape_starts] * len(default))]
-        return [(*x, *place) for place in places]
+        default = [_begun(getattr(kind, n), s) for n, s in self.secondary.items()]
+        points = [tuple(default), *itertools.product(*[TUNING.shape_starts] * len(default))]
+        return [(*x, *point) for point in points]
 
-    def probes(self) -> list[tuple[float, ...]]:
-        """Coordinates to span the directions in which it begins: small where it has a zero, or spread, or `places`."""
-        if self.places:
-            return list(self.places)
+    def scan_points(self) -> list[tuple[float, ...]]:
+        """Coordinates to linearise at: close to the null value, or spread where there is none, or `points`."""
+        if self.points:
+            return list(self.points)
         if self.null is not None:
             return self._beside(self.null)
         axes: list[list[float]] = []

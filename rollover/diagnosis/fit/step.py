@@ -1,29 +1,29 @@
-"""One step of a selection: the effect that is added to a base, and the candidates that competed for it."""
+"""What a selection is made with, and its steps: the effect added to a base, and the candidates that competed for it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
-from rollover.diagnosis.fit.cross_validation import cross_validated, cross_validated_by_refits, held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.data.phases import Phases
+from rollover.diagnosis.fit.cross_validation import Groups, cross_validated, cross_validated_by_refits, held_out
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
-
-Groups = Sequence[Sequence[int]]  # recordings that are held out together
-Phases = Sequence[Sequence[tuple[float, str]]]  # of each recording: when each phase begins, and its name
+from rollover.diagnosis.fit.tasks import ParallelMap, Progress, R, T, Task, serial_map
 
 
 @dataclass(frozen=True, kw_only=True)
 class Screened:
-    """A candidate looked at on a few recordings: the best starts, what is left there, the gain of its best direction.
+    """A candidate screened on a few recordings: the best starts, the chi2 there, the gain of its best direction.
 
     `nrmse` is what a first fit leaves over the noise, 0 where there was none.
     """
 
     candidate: Candidate
     starts: tuple[tuple[float, ...], ...]
-    left: float
+    chi2: float
     potential: float
     nrmse: float = 0.0
 
@@ -39,11 +39,13 @@ class Step:
     screened: tuple[Screened, ...] = ()
 
     def again(self, problem: Problem) -> Step:
-        """The same under the noise as it is held now."""
+        """The same under the problem's present noise model."""
         return self._each(problem.again)
 
-    def cross_validated(self, problem: Problem, groups: Groups, parallel_map: ParallelMap = serial_map) -> Step:
-        """The same with what its fits foretell by runs, where slopes do not hold for long; of drops its best alone."""
+    def cross_validated(
+        self, problem: Problem, groups: Groups, parallel_map: ParallelMap[Problem] = serial_map
+    ) -> Step:
+        """The same with held-out predictions by refits, where slopes do not hold for long; of drops its best alone."""
         if problem.effort.is_ensemble:
             return self._each(lambda f: cross_validated(problem, f, groups))
         return self.moved_to(
@@ -59,3 +61,38 @@ class Step:
     def moved_to(self, new: Fitted) -> Step:
         """The same with another fit of its best, among the rivals too."""
         return replace(self, fitted=new, rivals=tuple(new if f is self.fitted else f for f in self.rivals))
+
+
+class TaskRunner(Protocol):
+    """What works off fits and maps; `jobs.Executor` does."""
+
+    def fits(self, problem: Problem, tasks: Sequence[Task], say: Progress = ...) -> list[Fitted | None]:
+        """Fits in the order of the tasks; None where nothing could be simulated."""
+
+    def parallel_map(self, problem: Problem, function: Callable[[Problem, T], R], items: Sequence[T], /) -> list[R]:
+        """`function(problem, item)` of each, in their order."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inquiry:
+    """What every step of a selection is made with: problem, candidates, groups held out in turn, and the executor."""
+
+    problem: Problem
+    candidates: Sequence[Candidate]
+    groups: Groups
+    phases: Phases
+    say: Progress
+    executor: TaskRunner
+
+    def free(self, current: Fitted) -> list[Candidate]:
+        """Candidates that an explanation does not hold yet."""
+        used = {c.key for c in current.candidates}
+        return [c for c in self.candidates if c.key not in used]
+
+    def fits(self, tasks: Sequence[Task]) -> list[Fitted | None]:
+        """Fits of tasks, in their order; None where nothing could be simulated."""
+        return self.executor.fits(self.problem, tasks, self.say)
+
+    def parallel_map(self, function: Callable[[Problem, T], R], items: Sequence[T]) -> list[R]:
+        """`function(problem, item)` of each, in their order; see `Executor.parallel_map`."""
+        return self.executor.parallel_map(self.problem, function, items)

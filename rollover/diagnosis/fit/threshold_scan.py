@@ -9,8 +9,9 @@ import numpy as np
 from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, without_shift_direction
-from rollover.diagnosis.fit.local_search import blocks_at, left_at, representative_recordings
+from rollover.diagnosis.fit.local_search import blocks_at, chi2_at, representative_recordings
 from rollover.diagnosis.fit.parameterisation import Candidate, followed, strength_parameter
+from rollover.diagnosis.fit.tasks import Stretch
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
@@ -19,8 +20,6 @@ TUNING = SETTINGS.fit.threshold_scan
 AFAR = (np.arange(TUNING.wide_count) + 0.5) / TUNING.wide_count
 NEAR = TUNING.near_step * np.arange(-TUNING.near_count, TUNING.near_count + 1)
 CLOCKS = ("sensor-clock-offset", "sensor-clock-drift")
-
-Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to where it is tried
 
 
 def threshold_ranges(fitted: Fitted) -> list[Stretch]:
@@ -35,8 +34,8 @@ def threshold_ranges(fitted: Fitted) -> list[Stretch]:
         names = [name for name in last.search if name in EFFECTS[last.id].shapes]
     else:
         names = [name for name in last.search if (name == strength) == is_clock(fitted)]
-    places = [at + list(last.search).index(name) for name in names]
-    return [s for k in places for s in ((k, 0.0, fitted.x[k]), (k, fitted.x[k], 1.0))]
+    points = [at + list(last.search).index(name) for name in names]
+    return [s for k in points for s in ((k, 0.0, fitted.x[k]), (k, fitted.x[k], 1.0))]
 
 
 def is_clock(fitted: Fitted) -> bool:
@@ -73,11 +72,11 @@ def threshold_starts(
         return None
     alone = Fitted(candidates=first, x=x, blocks=tuple(blocks))
     best, least = None, alone.total
-    for place in second.probes():
-        there = _matched_strength(problem, alone, second, (*x, *place), few)
-        left = None if there is None else left_at(problem, (*first, second), there, shifts, few)
-        if left is not None and left < least:
-            best, least = there, left
+    for point in second.scan_points():
+        there = _matched_strength(problem, alone, second, (*x, *point), few)
+        chi2 = None if there is None else chi2_at(problem, (*first, second), there, shifts, few)
+        if chi2 is not None and chi2 < least:
+            best, least = there, chi2
     return best
 
 
@@ -98,50 +97,50 @@ def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) ->
         return best
     alone = Fitted(candidates=fitted.candidates[:-1], x=fitted.x[:at], blocks=tuple(blocks))
     met = []
-    for v in _places(fitted, stretch):
+    for v in _scan_points(fitted, stretch):
         there = (*fitted.x[:k], float(v), *fitted.x[k + 1 :])
         x = there if is_clock(fitted) else _matched_strength(problem, alone, last, there, few)
-        left = None if x is None else left_at(problem, fitted.candidates, x, shifts, few)
-        if x is not None and left is not None:
-            met.append((left, x))
+        chi2 = None if x is None else chi2_at(problem, fitted.candidates, x, shifts, few)
+        if x is not None and chi2 is not None:
+            met.append((chi2, x))
     for x in _best_start(problem, fitted, _local_minima(met)[: TUNING.valleys], few):
         again = problem.fit(fitted.candidates, x, shifts=shifts, width=1)
-        best = again if again is not None and again.left < best.left else best
+        best = again if again is not None and again.chi2 < best.chi2 else best
     return best
 
 
 def _best_start(
-    problem: Problem, fitted: Fitted, places: Sequence[tuple[float, ...]], few: Sequence[int]
+    problem: Problem, fitted: Fitted, points: Sequence[tuple[float, ...]], few: Sequence[int]
 ) -> list[tuple[float, ...]]:
     """Of several places those from which a short fit to `few` recordings comes to less than one from where a fit is."""
     at = [fitted.blocks[r].shift for r in few]
     short = [
         problem.fit(fitted.candidates, x, rounds=TUNING.short_rounds, only=few, shifts=at, width=1, no_jacobian=True)
-        for x in (fitted.x, *places)
+        for x in (fitted.x, *points)
     ]
     own = np.inf if short[0] is None else short[0].total
     return [one.x for one in short[1:] if one is not None and one.total < own]
 
 
 def _along_frequency_ridge(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
-    """The fit of what rings begun anew with another shape, along the valley of its frequency; never worse."""
+    """An oscillatory effect refitted from other secondary parameters, along its frequency's ridge; never worse."""
     shifts, at = [b.shift for b in fitted.blocks], len(fitted.x) - len(fitted.own)
     variant, own = fitted.candidates[-1].reshaped(fitted.own)
     candidates, x = (*fitted.candidates[:-1], variant), (*fitted.x[:at], *own)
-    there = [(*x[: stretch[0]], v, *x[stretch[0] + 1 :]) for v in _places(fitted, stretch)]
+    there = [(*x[: stretch[0]], v, *x[stretch[0] + 1 :]) for v in _scan_points(fitted, stretch)]
     few = representative_recordings(fitted)
-    met = [(left, y) for y in there if (left := left_at(problem, candidates, y, shifts, few)) is not None]
+    met = [(chi2, y) for y in there if (chi2 := chi2_at(problem, candidates, y, shifts, few)) is not None]
     best = fitted
     for y in _local_minima(met)[: TUNING.valleys]:
         new = problem.fit(candidates, y, shifts=shifts, width=1)
         if new is not None:
             plain = (*new.x[:at], *variant.plain(new.own)[1])
             again = problem.fit(fitted.candidates, plain, shifts=[b.shift for b in new.blocks], width=2)
-            best = again if again is not None and again.left < best.left else best
+            best = again if again is not None and again.chi2 < best.chi2 else best
     return best
 
 
-def _places(fitted: Fitted, stretch: Stretch) -> list[float]:
+def _scan_points(fitted: Fitted, stretch: Stretch) -> list[float]:
     """Where on its stretch a coordinate is tried."""
     k, low, high = stretch
     return sorted(float(v) for v in (*AFAR, *(fitted.x[k] + NEAR)) if low <= v <= high and 0.0 < v < 1.0)

@@ -25,7 +25,7 @@ from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
+from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import spoken
 
@@ -37,15 +37,18 @@ Made = Callable[[float], Array | None]
 Cost = Callable[[Array, Array], Array]  # of runs (m, n), each that many of the shifts (m,) late, s: what each leaves
 
 
-def align(problem: Problem) -> None:
+def estimate_time_shifts(problem: Problem) -> None:
     """Begin with the time shift at which each recording meets the scenario best."""
     for r, e in enumerate(problem.dataset if problem.effort.is_timed else ()):
-        found = _best(problem, r, partial(problem.raw, r, (), ()), partial(_whole, problem, r), _places(e))
+        found = _best(problem, r, partial(problem.raw, r, (), ()), partial(_whole, problem, r), _scan_points(e))
         problem.shifts[r] = problem.shifts[r] if found is None else found
 
 
 def shifts_from_contact(
-    problem: Problem, candidates: Sequence[Candidate], x: Sequence[float], parallel_map: ParallelMap = serial_map
+    problem: Problem,
+    candidates: Sequence[Candidate],
+    x: Sequence[float],
+    parallel_map: ParallelMap[Problem] = serial_map,
 ) -> list[float | None]:
     """Time shift (s) of each recording by its first contact; None where nothing comes of it."""
     return parallel_map(problem, partial(_by_contact, beside=(candidates, x)), range(len(problem.dataset)))
@@ -62,12 +65,12 @@ def _by_contact(problem: Problem, r: int, *, beside: Point) -> float | None:
 def _first_contact(problem: Problem, r: int, made: Made) -> float | None:
     """Time shift (s) of recording r by its first contact: found without a model, then beside there by the model."""
     e = problem.dataset[r]
-    places = _places(e)
+    shifts = _scan_points(e)
     # what never fell tells of no contact
-    places = places[places + e.simulator.contact > e.recording.time[TUNING.early_samples]]
-    if not (np.isfinite(e.simulator.contact) and places.size):
+    shifts = shifts[shifts + e.simulator.contact > e.recording.time[TUNING.early_samples]]
+    if not (np.isfinite(e.simulator.contact) and shifts.size):
         return None
-    about = _best(problem, r, made, partial(onset, problem, r), places)
+    about = _best(problem, r, made, partial(onset, problem, r), shifts)
     if about is None or not _is_free_fall(problem, r, made(about), about):
         return None
     at = _best(
@@ -82,7 +85,9 @@ def _first_contact(problem: Problem, r: int, made: Made) -> float | None:
     )  # the model leads away from it
 
 
-def clock_outliers(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> list[tuple[str, float]]:
+def clock_outliers(
+    problem: Problem, fitted: Fitted, parallel_map: ParallelMap[Problem] = serial_map
+) -> list[tuple[str, float]]:
     """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by."""
     if not problem.effort.is_timed:
         return []
@@ -90,14 +95,14 @@ def clock_outliers(problem: Problem, fitted: Fitted, parallel_map: ParallelMap =
     return [(e.name, at) for e, at in zip(problem.dataset, found, strict=True) if at is not None]
 
 
-def is_explained_by_clocks(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> bool:
+def is_explained_by_clocks(problem: Problem, fitted: Fitted, parallel_map: ParallelMap[Problem] = serial_map) -> bool:
     """Whether such shifts are all that separates the recordings from a fit: each else is met as it stands."""
     late = {name for name, _ in clock_outliers(problem, fitted, parallel_map)}
     others = [b for e, b in zip(problem.dataset, fitted.blocks, strict=True) if e.name not in late]
     return bool(late) and all(b.normal()[2] < TUNING.accepted_power * b.residual.size for b in others)
 
 
-def clock_evidence(found: Sequence[tuple[str, float]]) -> str:
+def clock_offset_sentence(found: Sequence[tuple[str, float]]) -> str:
     """What of `clock_outliers` stands behind the verdict."""
     each = [f"{spoken(abs(s) * 1e3)} ms {'late' if s > 0.0 else 'early'} ({name})" for name, s in found]
     if not each:
@@ -128,8 +133,8 @@ def _distant_shift(problem: Problem, r: int, *, fitted: Fitted) -> float | None:
         lambda raws, shifts: np.array([_left(e, raw, float(shift)) for raw, shift in zip(raws, shifts, strict=True)]),
         np.arange(-TUNING.largest_error, TUNING.largest_error, min(e.shift_prior, TUNING.no_physics)),
     )
-    shown = [at for at in onset_delay(e) if abs(at) > TUNING.no_physics] if falls else []
-    starts = [*([] if about is None else [about]), *shown]
+    delays = [at for at in onset_delay(e) if abs(at) > TUNING.no_physics] if falls else []
+    starts = [*([] if about is None else [about]), *delays]
     if not starts:
         return None
     there, least = min((_local_minimum(left, start, e.shift_prior) for start in starts), key=lambda found: found[1])
@@ -183,7 +188,7 @@ def _with_weights_moved(e: Dataset, shift: float) -> Dataset:
     return replace(e, signals=tuple(moved))
 
 
-def _places(e: Dataset) -> Array:
+def _scan_points(e: Dataset) -> Array:
     """Time shifts (s) that a recording's may be."""
     return np.asarray(TUNING.search_width * e.shift_prior * np.linspace(-1.0, 1.0, TUNING.search_count))
 
@@ -194,14 +199,14 @@ def _best(problem: Problem, r: int, made: Made, cost: Cost, shifts: Array) -> fl
     raw = made(0.0)
     if raw is None:
         return None
-    rough = []
+    costs = []
     for first in range(0, len(shifts), TUNING.search_at_once):
         some = shifts[first : first + TUNING.search_at_once]
         moved = np.empty((len(some), raw.size))
         for time, (_, part) in zip(e.times, e.spans(), strict=True):
             moved[:, part] = np.interp(time - some[:, None], time, raw[part])
-        rough.append(cost(moved, some))
-    near = shifts[int(np.argmin(np.concatenate(rough)))] + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
+        costs.append(cost(moved, some))
+    near = shifts[int(np.argmin(np.concatenate(costs)))] + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
     there = [made(float(s)) for s in near]
     left = np.full(len(near), np.inf)
     known = [k for k, y in enumerate(there) if y is not None]
@@ -252,7 +257,7 @@ def _is_free_fall(problem: Problem, r: int, raw: Array | None, shift: float) -> 
 
 
 def _worth(s: Signal) -> float:
-    """What a sample of a coloured noise is worth of one of a white one."""
+    """Effective samples of one sample of autocorrelated noise."""
     return max(1.0 - sum(s.ar), 0.05) / (1.0 + max(sum(s.ar), 0.0))
 
 
@@ -269,3 +274,14 @@ def _early(problem: Problem, r: int, raws: Array, shifts: Array) -> Array:
             inside = time < max([TUNING.early_window, *after])  # a record may end before
             total[k] += worth * float(np.sum(each[k][inside]))
     return total
+
+
+def with_shifts_near_prior(problem: Problem, base: Fitted) -> Fitted:
+    """A base with its time shifts no further from where known clocks say than their error."""
+    blocks = []
+    for r, b in enumerate(base.blocks):
+        known = problem.dataset[r].recording.clock.zero != "unknown"
+        there = min(max(b.shift, -b.prior), b.prior) if known else b.shift
+        new = problem.block(r, base.candidates, base.x, there, problem.effort.fine) if there != b.shift else b
+        blocks.append(new or b)
+    return replace(base, blocks=tuple(blocks))

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, within_means
-from rollover.diagnosis.forward.forward_model import Simulator, simulator_of
+from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.forward.full_run import full_runs
+from rollover.diagnosis.forward.interface import Simulator
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
 from rollover.recording import Recording

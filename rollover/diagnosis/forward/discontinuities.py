@@ -21,7 +21,7 @@ DISCONTINUITY = TUNING.sample_ratio
 WITHIN = TUNING.mean_ratio
 SHOWS = TUNING.visible_step  # times the noise, from which on a step may be a jump
 LARGE = TUNING.large_jump  # times the noise: a jump whose instant is not believed to the sample
-BESIDE = TUNING.neighbours  # samples to either side, between whose values one about a jump may be
+BESIDE = TUNING.samples_to_side  # samples to either side, between whose values one about a jump may be
 
 
 @compiled

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from functools import cached_property, lru_cache
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, largest_jump_nearby
 from rollover.diagnosis.forward.filtering import Rows, filtered_like, rows_of
 from rollover.diagnosis.forward.full_run import SENSORS, RunSimulator
+from rollover.diagnosis.forward.interface import EDGES, Array, Simulator
 from rollover.diagnosis.settings import SETTINGS
-from rollover.diagnosis.settings.forward import Effort
 from rollover.dynamics.drop_test import BESIDE, DropFailedError, DropModel, Track, channels_of, unfit
 from rollover.effects import every, read
 from rollover.recording import Recording
@@ -22,50 +21,8 @@ from rollover.scenario import Scenario
 from rollover.spec.document import Itself, exchanged
 from rollover.spec.initiation import Drop
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
-EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
 TUNING = SETTINGS.forward.drop
-
-
-class Simulator(Protocol):
-    """One recording's test, ready to be run with values exchanged by path."""
-
-    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
-        """Channels (n,) at the recording's stamps less `shift` (s); None if the simulation fails."""
-
-    def perturbed(
-        self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
-    ) -> list[dict[str, Array]]:
-        """What runs with `changes` that nobody could tell apart differ by, (n,) at the stamps less `shift`, s.
-
-        Each step of theirs is one of at least `parts` of the scenario's.
-        """
-
-    def choose_medoid(self) -> None:
-        """Of runs that nobody could tell apart take the one that is the most like all."""
-
-    def until(self, n: int) -> Simulator:
-        """The same for the first n stamps."""
-
-    def marks(self) -> tuple[tuple[float, str], ...]:
-        """(start s, name) of the phases of the scenario as it is; empty if the recording itself tells."""
-
-    def state(self, shift: float) -> Mapping[str, Array]:
-        """Motion of the scenario as it is, recorded or not, (n,) each; empty if it cannot be simulated."""
-
-    @property
-    def contact(self) -> float:
-        """When a scenario as it is first touches the ground, s; infinite if it never does or none can tell."""
-
-    @property
-    def effort(self) -> Effort:
-        """How much may be simulated."""
-
-
-def first_impact_of(simulator: Simulator) -> float:
-    """When the scenario as it is first hits the ground with more than its wheels, s; infinite if it never does."""
-    return next((at for at, name in simulator.marks() if name == "impact"), np.inf)
 
 
 class DropSimulator:
@@ -190,7 +147,7 @@ class DropSimulator:
         if values not in self._raw:
             at = times - shift
             rows = self._track(physical, float(at[-1]) if at.size else 0.0).rows(at)
-            self._keep(self._raw, values, channels_of(rows, self.recording.channels), TUNING.kept_predictions)
+            self._keep(self._raw, values, channels_of(rows, self.recording.channels), TUNING.cached_predictions)
         return self._raw[values]
 
     def _track(self, physical: Mapping[str, Any], until: float) -> Track:
@@ -199,7 +156,7 @@ class DropSimulator:
         found = self._tracks.pop(key, None)
         if found is None or found.until < until:
             found = self._model(physical).track(until + TUNING.track_margin)
-        self._keep(self._tracks, key, found, TUNING.kept_tracks)
+        self._keep(self._tracks, key, found, TUNING.cached_tracks)
         return found
 
     def _model(self, changes: Mapping[str, Any]) -> DropModel:
@@ -211,7 +168,7 @@ class DropSimulator:
             is_abrupt = has_own or any(effect.is_abrupt for effect in own.effects.values())
             may_jump = any(effect.force_terms() and not effect.is_smooth for effect in own.effects.values())
             step = TUNING.shortest_step if may_jump else TUNING.abrupt_step if is_abrupt else TUNING.longest_step
-            self._keep(self._models, key, DropModel(scenario=own, step=step), TUNING.kept_predictions)
+            self._keep(self._models, key, DropModel(scenario=own, step=step), TUNING.cached_predictions)
         return self._models[key]
 
     @staticmethod
@@ -251,11 +208,11 @@ def set_up(scenario: Scenario, recording: Recording) -> Scenario:
         hash(conditions)
     except TypeError:  # a value without a hash
         return _under(scenario, recording.conditions, recording.title)
-    return _kept_under(Itself(scenario), conditions, recording.title)
+    return _cached_under(Itself(scenario), conditions, recording.title)
 
 
-@lru_cache(maxsize=TUNING.kept_scenarios)  # each stage of a diagnosis asks for it, and reading values takes 10 ms
-def _kept_under(scenario: Itself, conditions: tuple[tuple[str, type, Any], ...], title: str) -> Scenario:
+@lru_cache(maxsize=TUNING.cached_scenarios)  # each stage of a diagnosis asks for it, and reading values takes 10 ms
+def _cached_under(scenario: Itself, conditions: tuple[tuple[str, type, Any], ...], title: str) -> Scenario:
     return _under(scenario.thing, {path: value for path, _, value in conditions}, title)
 
 
@@ -265,4 +222,4 @@ def _under(scenario: Scenario, conditions: Mapping[str, Any], title: str) -> Sce
     return replace(found, **{name: old for name, (old, new) in own.items() if new == old})
 
 
-__all__ = ["DropSimulator", "RunSimulator", "Simulator", "first_impact_of", "set_up", "simulator_of"]
+__all__ = ["DropSimulator", "RunSimulator", "set_up", "simulator_of"]

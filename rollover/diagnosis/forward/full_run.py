@@ -15,20 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.comparison.misfit import as_measured
-from rollover.diagnosis.forward.run_phases import phases_of
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Perturbation
+from rollover.dynamics.result import Run
 from rollover.effects import read
 from rollover.recording import Recording, attitude
 from rollover.recording.filters import filtered, least_rate
 from rollover.scenario import Scenario
 from rollover.spec.document import exchanged
+from rollover.spec.vehicle import Striker
 from rollover.system.processes import Children, map_cases
 
 Array = NDArray[np.float64]
 SENSORS = "sensor-"
 CENTRE = "ground.elements.centre"
 TUNING = SETTINGS.forward.run
+PHASES = SETTINGS.forward.phases
 MOTION = ("chassis/", "striker/", "axle/front/angle", "ground/sinkage")  # what an instrument's place is worked out from
 
 
@@ -75,8 +77,8 @@ def make(making: Making) -> Made:
         return Made(None, (), making.limit)
     if run.status == "failed":
         return Made(None, (), run.wall_time)
-    kept = {n: v for n, v in run.recording.channels.items() if n[:-1] in making.stems or n.startswith(MOTION)}
-    return Made((making.scenario.applied(), replace(run.recording, channels=kept)), phases_of(run), run.wall_time)
+    retained = {n: v for n, v in run.recording.channels.items() if n[:-1] in making.stems or n.startswith(MOTION)}
+    return Made((making.scenario.applied(), replace(run.recording, channels=retained)), run_phases(run), run.wall_time)
 
 
 class RunSimulator:
@@ -124,7 +126,7 @@ class RunSimulator:
         applied, run = known
         key = _key(changes)
         if key not in self._behind:
-            if len(self._behind) >= TUNING.kept_runs:
+            if len(self._behind) >= TUNING.cached_runs:
                 self._behind.pop(next(iter(self._behind)))
             seen = as_measured(applied, run, self.recording)
             self._behind[key] = (
@@ -201,24 +203,24 @@ class RunSimulator:
         The medoid: the least sum of the distances to the others and to the neighbours, each the root mean square over
         the channels' ranges.
         """
-        places = self._places()
-        own = [{CENTRE: place} for place in places]
+        centres = self._grid_centres()
+        own = [{CENTRE: centre} for centre in centres]
         others = [values for values in map(self._beside, TUNING.perturbations) if values not in own]
         self.predict(own[0], 0.0)  # how long one takes
         made_ahead(self.children, [(self, values) for values in (*own, *others)])
-        runs = {place: self.predict({CENTRE: place}, 0.0) for place in places}
-        there = {place: run for place, run in runs.items() if run is not None}
+        runs = {centre: self.predict({CENTRE: centre}, 0.0) for centre in centres}
+        there = {centre: run for centre, run in runs.items() if run is not None}
         if len(there) < 3:
             return
         beside = [self.predict(values, 0.0) for values in others]
-        stacks = {place: np.concatenate(list(_scaled(run).values())) for place, run in there.items()}
+        stacks = {centre: np.concatenate(list(_scaled(run).values())) for centre, run in there.items()}
         every = [*stacks.values(), *(np.concatenate(list(_scaled(run).values())) for run in beside if run is not None)]
         inside = np.all([np.isfinite(y) for y in every], axis=0)
         apart = {
-            place: sum(float(np.sqrt(np.mean((y - other)[inside] ** 2))) for other in every)
-            for place, y in stacks.items()
+            centre: sum(float(np.sqrt(np.mean((y - other)[inside] ** 2))) for other in every)
+            for centre, y in stacks.items()
         }
-        best = min(apart, key=lambda place: apart[place])
+        best = min(apart, key=lambda centre: apart[centre])
         self.scenario = self.scenario.replaced({CENTRE: best})
         known, behind = self._known.get(_key({CENTRE: best})), self._behind.get(_key({CENTRE: best}))
         if known is not None and behind is not None:
@@ -247,15 +249,15 @@ class RunSimulator:
         found.reference = self.reference
         return found
 
-    def _places(self) -> list[tuple[float, ...]]:
+    def _grid_centres(self) -> list[tuple[float, ...]]:
         """Where the grid may lie as well, where the scenario has it first."""
-        return [self._place(fraction) for fraction in ((0.0, 0.0), *TUNING.grid_offsets)]
+        return [self._grid_centre(fraction) for fraction in ((0.0, 0.0), *TUNING.grid_offsets)]
 
     def _beside(self, one: Perturbation, parts: int = 1) -> dict[str, Any]:
         """Values of a neighbour, its step parted in at least so many `parts`."""
         own, ground = self.scenario, self.scenario.ground.elements
-        place = self._place(one.place)
-        found: dict[str, Any] = {CENTRE: self._centre if place == ground.centre else place}
+        centre = self._grid_centre(one.grid_offset)
+        found: dict[str, Any] = {CENTRE: self._centre if centre == ground.centre else centre}
         if one.spacing != 1.0:
             found["ground.elements.spacing"] = tuple(one.spacing * w for w in ground.spacing)
         if one.points != 1.0:
@@ -264,7 +266,7 @@ class RunSimulator:
             found["simulation.step"] = own.simulation.step / max(parts, one.parts)
         return found
 
-    def _place(self, fraction: tuple[float, float]) -> tuple[float, ...]:
+    def _grid_centre(self, fraction: tuple[float, float]) -> tuple[float, ...]:
         spacing = self.scenario.ground.elements.spacing
         return tuple(c + f * w for c, f, w in zip(self._centre, fraction, spacing, strict=True))
 
@@ -285,7 +287,7 @@ class RunSimulator:
             self._limit = max(TUNING.slowest_ratio * made.seconds, TUNING.least_wall_time)
         if made.run is not None and all(path == CENTRE for path, _ in making.key):
             self._phases[making.scenario.ground.elements.centre] = made.phases
-        if len(self._known) >= TUNING.kept_runs:
+        if len(self._known) >= TUNING.cached_runs:
             self._known.pop(next(iter(self._known)))
         self._known[making.key] = made.run
 
@@ -362,3 +364,24 @@ def _covering(scenario: Scenario, recording: Recording) -> Scenario:
     rows = max(1, int(np.ceil(end / settings.output_step)))
     duration = round(min(rows * settings.output_step, 120.0), 9)
     return replace(scenario, simulation=replace(settings, duration=duration, stop_at_rest=False))
+
+
+def run_phases(run: Run) -> tuple[tuple[float, str], ...]:
+    """(start s, name) of support, tipping, impact, sliding, rest: sliding is what comes after the last impact.
+
+    An impact is a force of the ground beyond `impact_force` times the weight; support ends with the first wheel that
+    lifts off, tipping with the first part that hits the ground and is no wheel.
+    """
+    marks = list(run.phases)
+    start = next((at for at, name in marks if name == "impact"), None)
+    if start is None:
+        return tuple(marks)
+    vehicle = run.scenario.vehicle
+    mass = vehicle.mass if isinstance(vehicle, Striker) else vehicle.whole.mass
+    time, force = run.recording.time, run.recording["ground/force_normal"]
+    impacts = time[(force > PHASES.impact_force * mass * run.scenario.gravity) & (time >= start)]
+    end = next((at for at, name in marks if name == "rest"), float(time[-1]))
+    sliding = float(impacts[-1]) if impacts.size else start
+    if start < sliding < end - PHASES.least_sliding:
+        marks.append((sliding, "sliding"))
+    return tuple(sorted(marks))

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.stretches import channel_of, stretches
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.result import Scale
 from rollover.diagnosis.settings import SETTINGS
 from rollover.spec.channels import describe

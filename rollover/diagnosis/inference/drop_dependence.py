@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
+from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.fit.time_shift import shifts_from_contact
 from rollover.diagnosis.inference.bases import ACCELERATION, DEPTH, SPEED, TIME, linear_b_splines
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
@@ -54,8 +55,8 @@ class Dependence:
 
         In tests that begin alike all goes in time, what the vehicle does too; a sensor's fault goes with no attitude.
         """
-        tells = bool(motion.shares) and motion.shares[0][0] != TIME and motion.shares[0][1] > TUNING.sensor_share
-        return self.on == TIME and tells
+        has_quantity = bool(motion.shares) and motion.shares[0][0] != TIME and motion.shares[0][1] > TUNING.sensor_share
+        return self.on == TIME and has_quantity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +89,7 @@ def _steady(N: Array) -> Array:
 
 
 def dependence(
-    problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap = serial_map
+    problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap[Problem] = serial_map
 ) -> Dependence:
     """What is left beside a fit depends on what; `scenarios` under the conditions of the recordings."""
     dataset = problem.dataset
@@ -115,7 +116,7 @@ def dependence_of_one(problem: Problem, base: Fitted, before: Mismatch) -> Depen
 
 
 def loading_paths(
-    problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap = serial_map
+    problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap[Problem] = serial_map
 ) -> tuple[list[list[ResidualBlock]], list[Descent]]:
     """Each recording at some time shifts, and its way down at the best of them."""
     shifts = shifts_from_contact(problem, base.candidates, base.x, parallel_map)
@@ -182,7 +183,7 @@ def without_shift_directions(w: Array, slope: Array, prior: float) -> Array:
 
 
 def _of_forces(
-    problem: Problem, found: Sequence[Descent], parallel_map: ParallelMap
+    problem: Problem, found: Sequence[Descent], parallel_map: ParallelMap[Problem]
 ) -> tuple[list[Model], list[Array], float, float]:
     """Every model of a force, the misfits, the noise's part of them, and phi."""
     misfits = [without_shift_directions(d.residual[d.rows], d.slope[d.rows], d.prior) for d in found]
@@ -206,10 +207,10 @@ def _of_forces(
         if where == "ground":
             by_touch = [np.array([[1.0, np.log(d.way.touch)]]) for d in found]
             functions.append((IMPACT, [s * row for s, row in zip(strength, by_touch, strict=True)]))
-        ends = np.cumsum([basis[0].shape[1] for _, basis in functions])[:-1]
+        splits = np.cumsum([basis[0].shape[1] for _, basis in functions])[:-1]
         forces = [np.hstack([basis[k] for _, basis in functions]) for k in range(len(found))]
         felt = parallel_map(problem, partial(_felt, where=where), list(zip(found, forces, strict=True)))
-        each = zip(*(np.split(J, ends, axis=1) for J in felt), strict=True)
+        each = zip(*(np.split(J, splits, axis=1) for J in felt), strict=True)
         models += [Model(on=on, columns=columns) for (on, _), columns in zip(functions, each, strict=True)]
     n = float(sum(w.size for w in misfits))
     free = sum(d.free for d in found)
@@ -237,9 +238,9 @@ def _of_channel(channel: str, problem: Problem, base: Fitted) -> tuple[list[Mode
                 slots.append((e, b, part))
     models: list[Model] = []
 
-    def add(on: str, shapes: Sequence[Array]) -> None:
+    def add(on: str, functions_at: Sequence[Array]) -> None:
         columns = []
-        for (e, b, part), f in zip(slots, shapes, strict=True):
+        for (e, b, part), f in zip(slots, functions_at, strict=True):
             raw = np.zeros((e.count, f.shape[1]))
             raw[part] = f
             columns.append(b.counted(e.whitened(raw))[part])

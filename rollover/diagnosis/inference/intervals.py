@@ -16,11 +16,11 @@ from rollover.diagnosis.fit.ensemble_mean import (
     ensemble_mean_step,
     projected_gradient,
 )
-from rollover.diagnosis.fit.jobs import linearised
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import ResidualBlock, at_an_end, time_shift_step
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, at_an_end, time_shift_step
+from rollover.diagnosis.fit.local_search import linearised
 from rollover.diagnosis.fit.parameterisation import Candidate, physical, with_slices
-from rollover.diagnosis.inference.local_quadratic import roughness_extents, student_widening
+from rollover.diagnosis.inference.local_quadratic import local_quadratic_extents, student_widening
 from rollover.diagnosis.result import Interval
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, possible, units_of
@@ -69,17 +69,17 @@ def shape_variance(problem: Problem, fitted: Fitted, inverse: Array) -> Array:
     """Variances (p,) of what shapes of the last effect that are not fitted would move: each evenly over its range."""
     found = np.zeros(len(fitted.x))
     last, at = fitted.candidates[-1], list(fitted.x)
-    shapes = list(last.shapes)
-    if any(getattr(EFFECTS[last.id](), name, 0.0) is None for name in shapes):
+    secondary = list(last.secondary)
+    if any(getattr(EFFECTS[last.id](), name, 0.0) is None for name in secondary):
         return found  # as the scenario has it
-    begun = last.with_secondary(())[0] if shapes else ()
+    begun = last.with_secondary(())[0] if secondary else ()
     whole = (*fitted.candidates[:-1], last.whole())
-    for k in range(len(shapes)):
+    for k in range(len(secondary)):
         pull = np.zeros(len(fitted.x))
         low, high = (min(max(begun[k] + s * EVENLY, 0.0), 1.0) for s in (-1.0, 1.0))
-        ends = [(whole, [*at, *begun[:k], v, *begun[k + 1 :]]) for v in (low, high)]
+        steps = [(whole, [*at, *begun[:k], v, *begun[k + 1 :]]) for v in (low, high)]
         for r, block in enumerate(fitted.blocks):
-            d = problem.moved(r, ends[0], ends[1], block.shift)
+            d = problem.moved(r, steps[0], steps[1], block.shift)
             if d is not None:
                 d = block.counted(d)
                 pull += block.J.T @ d - (block.J.T @ block.slope) * float(block.slope @ d) / block.weight
@@ -94,11 +94,13 @@ def with_secondary(problem: Problem, fitted: Fitted) -> tuple[Fitted, Array, lis
     usually not there is left out, and where a look costs a run all are: see `shape_variance`.
     """
     candidates, x, primary, prior = [], list[float](), list[int](), list[float]()
-    for c, place in with_slices(fitted.candidates):
-        own = fitted.x[place]
+    for c, columns in with_slices(fitted.candidates):
+        own = fitted.x[columns]
         primary += range(len(x), len(x) + len(own))
-        usual = {name: getattr(EFFECTS[c.id](), name) for name in c.shapes}
-        estimated = all(v is not None and c.shapes[name].low <= v <= c.shapes[name].high for name, v in usual.items())
+        usual = {name: getattr(EFFECTS[c.id](), name) for name in c.secondary}
+        estimated = all(
+            v is not None and c.secondary[name].low <= v <= c.secondary[name].high for name, v in usual.items()
+        )
         whole = c.with_secondary(own)[0] if estimated and usual else own
         prior += [GENTLE] * len(own) + [EVENLY**-2] * (len(whole) - len(own))
         x += whole
@@ -108,7 +110,7 @@ def with_secondary(problem: Problem, fitted: Fitted) -> tuple[Fitted, Array, lis
         if found is not None:
             return found, np.array(prior), primary
     # of a parameter of a narrow effect recordings may tell nothing at all: it lies evenly in its range
-    own_prior = [EVENLY**-2 if c.is_narrow else GENTLE for c in fitted.candidates for _ in c.search]
+    own_prior = [EVENLY**-2 if c.is_local else GENTLE for c in fitted.candidates for _ in c.search]
     return fitted, np.array(own_prior), list(range(len(fitted.x)))
 
 
@@ -122,7 +124,7 @@ def profile_extents(
     that scatter it is the misfit of their mean, which is rough by itself. With `sides` these alone are looked at.
     """
     found, due = np.ones((own.size, 2)), TWO_SIDED**2 * dispersion
-    enough = max(TUNING.least_rise * due, TUNING.rough_rise if any(e.perturbed for e in problem.dataset) else 0.0)
+    enough = max(TUNING.least_rise * due, TUNING.model_error_rise if any(e.perturbed for e in problem.dataset) else 0.0)
     if sides is not None and not any(sides.values()):
         return found
     start = _misfit(problem, fitted, np.zeros(len(fitted.x)))
@@ -191,7 +193,7 @@ def _along_ridge(
     """
     (start, due), far = rise, begun
     x, shifts = [v for j, v in enumerate(fitted.x) if j != k], [b.shift for b in fitted.blocks]
-    if any(len(c.search) == 1 for c, place in with_slices(fitted.candidates) if place.start <= k < place.stop):
+    if any(len(c.search) == 1 for c, columns in with_slices(fitted.candidates) if columns.start <= k < columns.stop):
         return far
     inside, beyond = (far, due), far
     for _ in range(TUNING.ridge_steps):
@@ -202,18 +204,20 @@ def _along_ridge(
         found = problem.fit(held_at(fitted, k, at), x, rounds=TUNING.held_rounds, shifts=shifts, width=1)
         if found is None:
             break
-        if found.left - start > due:
+        if found.chi2 - start > due:
             low = min(max(inside[1], 0.0), due)
-            share = (np.sqrt(due) - np.sqrt(low)) / max(np.sqrt(found.left - start) - np.sqrt(low), 1e-9)
+            share = (np.sqrt(due) - np.sqrt(low)) / max(np.sqrt(found.chi2 - start) - np.sqrt(low), 1e-9)
             return float(inside[0] + share * (beyond - inside[0])) if low < due else inside[0]
-        inside, x, shifts = (beyond, found.left - start), list(found.x), [b.shift for b in found.blocks]
+        inside, x, shifts = (beyond, found.chi2 - start), list(found.x), [b.shift for b in found.blocks]
     return inside[0]
 
 
 def held_at(fitted: Fitted, k: int, at: float) -> list[Candidate]:
     """The effects of a fit with its k-th coordinate held at a place."""
-    c, place = next((c, place) for c, place in with_slices(fitted.candidates) if place.start <= k < place.stop)
-    name = list(c.search)[k - place.start]
+    c, columns = next(
+        (c, columns) for c, columns in with_slices(fitted.candidates) if columns.start <= k < columns.stop
+    )
+    name = list(c.search)[k - columns.start]
     rest = {n: s for n, s in c.search.items() if n != name}
     held = replace(c, search=rest, fixed={**c.fixed, name: physical(at, c.search[name])})
     return [held if one is c else one for one in fitted.candidates]
@@ -231,7 +235,7 @@ def _within_range(problem: Problem, fitted: Fitted, wide: Array, dispersion: flo
     def is_met(k: int, at: float) -> bool:
         others = [v for j, v in enumerate(fitted.x) if j != k]
         there = problem.fit(held_at(fitted, k, at), others, rounds=TUNING.held_rounds, shifts=shifts, width=1)
-        return there is None or there.left - fitted.left < due
+        return there is None or there.chi2 - fitted.chi2 < due
 
     for k, x in enumerate(fitted.x):
         for side, end in enumerate((0.0, 1.0)):
@@ -246,15 +250,15 @@ def _within_range(problem: Problem, fitted: Fitted, wide: Array, dispersion: flo
 
 
 def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: float) -> Array:
-    """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `roughness_extents`.
+    """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `local_quadratic_extents`.
 
     In units of `own` deviations down and up, NaN where runs do not tell. It has in it what scatter and disagreement do.
     """
     found = np.full((own.size, 2), np.nan)
     for k, way in enumerate(_ways(fitted, own)):
 
-        def runs(places: Sequence[float], way: Array = way) -> list[Sequence[ResidualBlock] | None]:
-            points = [np.array(fitted.x) + t * way for t in places]
+        def runs(steps: Sequence[float], way: Array = way) -> list[Sequence[ResidualBlock] | None]:
+            points = [np.array(fitted.x) + t * way for t in steps]
             inside = [bool(np.all((x >= 0.0) & (x <= 1.0))) for x in points]
             problem.made_ahead(
                 (r, fitted.candidates, [float(v) for v in x])
@@ -262,11 +266,12 @@ def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: 
                 for r in range(len(fitted.blocks) if there else 0)
             )
             met = [
-                _clocked(problem, fitted, t * way) if there else None for t, there in zip(places, inside, strict=True)
+                _clocked(problem, fitted, t * way) if there else None for t, there in zip(steps, inside, strict=True)
             ]
             return [None if f is None else f.blocks for f in met]
 
-        estimated = roughness_extents(runs, [b.unweighted_J @ way for b in fitted.blocks], TWO_SIDED**2 * dispersion)
+        slopes = [b.unweighted_J @ way for b in fitted.blocks]
+        estimated = local_quadratic_extents(runs, slopes, TWO_SIDED**2 * dispersion)
         if estimated is not None:
             found[k] = estimated
     return found
@@ -277,7 +282,7 @@ def _misfit(problem: Problem, fitted: Fitted, way: Array) -> float | None:
     moved = _clocked(problem, fitted, way)
     if moved is None:
         return None
-    return ensemble_mean_misfit(problem, moved)[0] if any(e.perturbed for e in problem.dataset) else moved.left
+    return ensemble_mean_misfit(problem, moved)[0] if any(e.perturbed for e in problem.dataset) else moved.chi2
 
 
 def _clocked(problem: Problem, fitted: Fitted, way: Array) -> Fitted | None:
@@ -323,7 +328,7 @@ def intervals(
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + np.diag(prior)
     inverse: Array = np.asarray(np.linalg.inv(A), dtype=np.float64)
     count = sum(b.residual.size for b in fitted.blocks)
-    dispersion = max(1.0, fitted.left / count) * problem.samples_per_error
+    dispersion = max(1.0, fitted.chi2 / count) * problem.samples_per_error
     strayed = any(e.perturbed for e in problem.dataset)
     noise = inverse @ _noise(problem, fitted, prior) @ inverse if strayed else inverse
     sd = np.sqrt(np.maximum(dispersion * np.diag(noise), 0.0))
@@ -349,12 +354,12 @@ def intervals(
         variance = np.maximum(variance, between_recording_variance(problem.dataset, fitted.blocks, inverse))
     sd = np.sqrt(variance)[primary]
     own = np.sqrt(dispersion * np.diag(inverse))[primary]
-    rough = np.full((own.size, 2), np.nan)
+    extents = np.full((own.size, 2), np.nan)
     if strayed and sides is None:
-        rough = quadratic_extents(problem, problem.again(coarse), own, dispersion)
-        sides = {k: BOTH for k in range(own.size) if np.isnan(rough[k, 0])}  # for means of seven runs
+        extents = quadratic_extents(problem, problem.again(coarse), own, dispersion)
+        sides = {k: BOTH for k in range(own.size) if np.isnan(extents[k, 0])}  # for means of seven runs
     far = profile_extents(problem, coarse, own, dispersion, sides)
-    wide = np.fmax(np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (far**2 - 1.0)), own[:, None] * rough)
+    wide = np.fmax(np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (far**2 - 1.0)), own[:, None] * extents)
     if not problem.effort.is_ensemble:
         wide = _within_range(problem, estimated, wide, dispersion)
     found, at = [], 0
@@ -376,18 +381,16 @@ def intervals(
             )
             at += 1
         if c.id == "sensor-clipping":
-            values = {
-                name: with_full_scale(one, full_scale_of(problem.dataset, c.channel)) for name, one in values.items()
-            }
-        values |= {n: Interval(value=v, low=v, high=v, unit=units.get(n, "")) for n, v in c.form.items()}
+            end = full_scale_of(problem.dataset, c.channel)
+            values = {name: with_full_scale(one, end) for name, one in values.items()}
+        values |= {n: Interval(value=v, low=v, high=v, unit=units.get(n, "")) for n, v in c.variant.items()}
         found.append(values)
     return found
 
 
 def full_scale_of(dataset: Sequence[Dataset], channel: str | None) -> float | None:
     """Size of the largest value of a channel if it is met again and again, to the last digit: the end of a range."""
-    ends = [s.end for e in dataset for s in e.signals if s.channel == channel]
-    return max(ends, default=0.0) or None
+    return max((s.end for e in dataset for s in e.signals if s.channel == channel), default=0.0) or None
 
 
 def with_full_scale(fitted: Interval, end: float | None) -> Interval:

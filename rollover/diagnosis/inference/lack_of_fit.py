@@ -8,11 +8,11 @@ Where runs scatter, samples are weighed (D3), and of S = |Q'w|^2 noise and scatt
 
     M = tr(Q'W^2 Q) + mean_k |Q'd_k|^2                                                                          (D14)
 
-d_k what neighbours differ by, each weighed by what the others scatter, as the recording is; the first term times what
-whitening leaves of slow noise (`colour.Rest`). Where another course is forgiven, both count after the impact for what
-they would in a recording that differs by d_k (D9). S/M then has nu = 2 M^2/var S degrees of freedom, var S from the
-noise, from noise and scatter together, and from how far the neighbours of a recording differ in all its cells at once;
-M is known as well as so few neighbours tell.
+d_k the deviations of the perturbed runs, each weighed by the scatter of the others, as the recording is; the first term
+times what whitening leaves of slow noise (`Rest`). Where divergence after an impact is masked, both count
+after it for what they would in a recording that differs by d_k (D9). S/M then has nu = 2 M^2/var S degrees of freedom,
+var S from the noise, from noise and scatter together, and from how far the perturbed runs of a recording differ in all
+its cells at once; so few runs limit how well M is known.
 """
 
 from __future__ import annotations
@@ -25,20 +25,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.linearisation import ResidualBlock
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.noise.autoregression import Rest, line_spectra, rests
 from rollover.diagnosis.noise.ensemble import (
     has_diverged,
-    leave_one_out_neighbours,
+    leave_one_out_scatter,
     p_value_of_divergence,
     shares,
 )
-from rollover.diagnosis.noise.outliers import outlier_p_value
 from rollover.diagnosis.noise.spectral_lines import basis as line
+from rollover.diagnosis.noise.spectral_lines import outlier_p_value
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.inference.lack_of_fit
+ADEQUACY = SETTINGS.inference.adequacy
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,8 +57,8 @@ class Cell:
     excess: float
     structured: float
     waves: int
-    rough: float
-    noise: tuple[float, float]  # what noise alone leaves of `structured`, and of `rough`
+    noise_power: float
+    noise: tuple[float, float]  # what noise alone leaves of `structured`, and of `noise_power`
     strayed: Array = field(default_factory=lambda: np.zeros((0, 2)))  # (k, 2): and each neighbour
 
     @property
@@ -99,9 +101,9 @@ class Mismatch:
 def mismatch_of(
     dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], phases: Sequence[Sequence[tuple[float, str]]]
 ) -> Mismatch:
-    """Judge the residuals at a fitted point; `phases` are (start, name) for each recording."""
+    """Lack-of-fit test of the residuals at a fitted point; `phases` are (start, name) for each recording."""
     cells: list[Cell] = []
-    perturbed = [leave_one_out_neighbours(e) for e in dataset]
+    perturbed = [leave_one_out_scatter(e) for e in dataset]
     worth = [_worth(e, block, apart) for e, block, apart in zip(dataset, blocks, perturbed, strict=True)]
     humming, colours = line_spectra(dataset, [b.residual_for_squares for b in blocks]), rests(dataset)
     for r, (e, block) in enumerate(zip(dataset, blocks, strict=True)):
@@ -128,7 +130,7 @@ def mismatch_of(
     p = min(_p_value(telling, len(blocks)), outlier_p_value(np.concatenate(w) for w in by_channel.values()))
     sent = p_value_of_divergence(sum(other), len(other))
     p = (
-        min(p, sent) if sent <= SETTINGS.noise.ensemble.other_course_p_value else p
+        min(p, sent) if sent <= SETTINGS.noise.ensemble.divergence_p_value else p
     )  # one may, not all of them: whole numbers, and no p-value until they tell
     return Mismatch(cells=tuple(cells), telling=tuple(telling), p_value=p, adjusted=_holm([c.p_value for c in cells]))
 
@@ -161,20 +163,20 @@ def _worth(e: Dataset, block: ResidualBlock, perturbed: Array) -> Array:
     return np.where(e.early, 1.0, np.sqrt(shares(e, perturbed))[:, None])
 
 
-def _p_value(cells: Sequence[Cell], clocks: int) -> float:
-    """p-value of what is slow in several cells together, beside as many `clocks` that were fitted."""
+def _p_value(cells: Sequence[Cell], time_shifts: int) -> float:
+    """p-value of what is slow in several cells together, beside as many `time_shifts` that were fitted."""
     from scipy.special import fdtrc
 
     structured = sum(c.structured for c in cells)
     waves = sum(c.waves for c in cells)
-    rough = sum(c.rough for c in cells)
-    count = sum(c.rows.size for c in cells) - waves - clocks
+    noise_power = sum(c.noise_power for c in cells)
+    count = sum(c.rows.size for c in cells) - waves - time_shifts
     if not waves or count <= 0:
         return 1.0
     if all(c.noise[0] == c.waves for c in cells):
         # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
         return float(
-            fdtrc(waves, count, (structured / waves) / min(max(rough / count, 1e-300), TUNING.most_dispersion))
+            fdtrc(waves, count, (structured / waves) / min(max(noise_power / count, 1e-300), TUNING.most_dispersion))
         )
     expected = sum(c.expected for c in cells)
     variance = sum(2.0 * c.noise[0] * (1.0 + 2.0 * (c.expected - c.noise[0]) / c.waves) for c in cells)
@@ -186,7 +188,7 @@ def _p_value(cells: Sequence[Cell], clocks: int) -> float:
             scatter = SETTINGS.noise.ensemble.few_factor * float(np.var(apart, ddof=1))
             variance += scatter
             unsure += scatter / apart.size  # a mean is known as well as so many tell
-    level = min(max(rough / max(sum(c.rest for c in cells), 1e-300), 1.0), TUNING.most_dispersion)
+    level = min(max(noise_power / max(sum(c.rest for c in cells), 1e-300), 1.0), TUNING.most_dispersion)
     known = 2.0 * expected**2 / unsure
     return float(fdtrc(2.0 * expected**2 / variance, known, structured / expected / level))
 
@@ -217,11 +219,11 @@ def _cell(
     basis = basis - taken @ (taken.T @ basis)
     Q, _ = np.linalg.qr(basis)
     inside = Q.T @ w
-    structured, rough = float(inside @ inside), float(w @ w - inside @ inside)
+    structured, noise_power = float(inside @ inside), float(w @ w - inside @ inside)
     free = max(n - waves - 1, 1)
     found = Cell(
         recording=r, channel=channel, phase=phase, start=float(time[0]), end=float(time[-1]), rows=rows, p_value=1.0,
-        excess=float(w @ w) - n, structured=structured, waves=waves, rough=max(rough, 0.0),
+        excess=float(w @ w) - n, structured=structured, waves=waves, noise_power=max(noise_power, 0.0),
         noise=(float(waves), float(n - waves)),
     )  # fmt: skip
     if due is not None:
@@ -231,7 +233,7 @@ def _cell(
         return replace(found, excess=excess, p_value=_p_value([found], 1))
     if n <= waves + 1:
         return found
-    return replace(found, p_value=float(fdtrc(waves, free, (structured / waves) / max(rough / free, 1e-300))))
+    return replace(found, p_value=float(fdtrc(waves, free, (structured / waves) / max(noise_power / free, 1e-300))))
 
 
 def _holm(p: Sequence[float]) -> tuple[float, ...]:
@@ -243,3 +245,30 @@ def _holm(p: Sequence[float]) -> tuple[float, ...]:
         worst = max(worst, min(1.0, (len(p) - rank) * p[k]))
         adjusted[k] = worst
     return tuple(float(v) for v in adjusted)
+
+
+def is_enough(problem: Problem, fitted: Fitted, mismatch: Mismatch) -> bool:
+    """Whether what a fit leaves is no more than chance, or not worth a word."""
+    return mismatch.p_value > SETTINGS.inference.lack_of_fit.p_value or not matters(problem, fitted, mismatch)
+
+
+def matters(problem: Problem, base: Fitted, before: Mismatch) -> bool:
+    """Whether the structure of the misfit is worth a word: beyond a share of a channel's range."""
+    most = 0.0
+    for r, e in enumerate(problem.dataset[: len(base.blocks)]):
+        for signal, part in e.spans():
+            cells = [c for c in before.cells if c.recording == r and part.start <= c.rows[0] < part.stop]
+            chance = sum(c.rows.size if e.model_error_dominates(signal) else c.expected for c in cells)
+            power = (sum(c.structured for c in cells) - chance) / max(sum(c.rows.size for c in cells), 1)
+            most = max(most, float(np.sqrt(max(power, 0.0))) * signal.sigma / signal.span)
+    return most > ADEQUACY.negligible
+
+
+def is_tolerated(problem: Problem, fitted: Fitted) -> bool:
+    """Whether what is left is no more than a scatter between runs, or a tolerance that was asked for, leaves by chance.
+
+    One error of unit size for each of k signals: a mean square of 1 with a standard deviation of sqrt(2/k).
+    """
+    dominated = [e.model_error_dominates(s) for e in problem.dataset for s in e.signals]
+    most = 1.0 + 2.0 * np.sqrt(2.0 / len(dominated))
+    return all(dominated) and bool(fitted.chi2 < most * sum(b.residual.size for b in fitted.blocks))

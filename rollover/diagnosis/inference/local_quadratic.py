@@ -47,7 +47,7 @@ def student_widening(free: float) -> float:
     return (float(stdtrit(free, 0.975)) / TUNING.normal_quantile) ** 2
 
 
-def roughness_extents(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[float, float] | None:
+def local_quadratic_extents(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[float, float] | None:
     """How far (t, down and up) the mean course of runs may be what was measured, by (R1) to (R3).
 
     `slopes` (n,) are those at the fit, of each recording by t, of samples that count in full. Nought both where they
@@ -57,19 +57,19 @@ def roughness_extents(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[
     met: list[tuple[float, Sequence[ResidualBlock]]] = []
     best = Slope(clear=0.0)
     for stage in TUNING.stages:
-        places = [side * at for at in stage for side in (-1.0, 1.0)]
-        met += [(at, blocks) for at, blocks in zip(places, runs(places), strict=True) if blocks is not None]
-        if len(met) < TUNING.least_places:
+        points = [side * at for at in stage for side in (-1.0, 1.0)]
+        met += [(at, blocks) for at, blocks in zip(points, runs(points), strict=True) if blocks is not None]
+        if len(met) < TUNING.least_points:
             continue
         t = np.array([at for at, _ in met])
-        nearest = [int(k) for k in np.argsort([total_of(blocks) for _, blocks in met])[: TUNING.least_places]]
+        nearest = [int(k) for k in np.argsort([total_of(blocks) for _, blocks in met])[: TUNING.least_points]]
         each = zip(*(blocks for _, blocks in met), strict=True)
         recordings = [_alike(blocks, nearest, J) for blocks, J in zip(each, slopes, strict=True)]
         squares = sum(np.sum(left**2, axis=1) for left, _ in recordings)
         # not the least: one run may take the recording's own course
-        low = np.sort(squares)[TUNING.least_places // 2 - 1]
+        low = np.sort(squares)[TUNING.least_points // 2 - 1]
         inliers = np.abs(squares - low) < TUNING.outlier_ratio * due * t**2 + TUNING.outlier_rise * due
-        if np.sum(inliers) < TUNING.least_places:
+        if np.sum(inliers) < TUNING.least_points:
             continue
         found = _slope(t[inliers], [(left[inliers], J) for left, J in recordings], due)
         if found.clear > TUNING.some_slope and found.flat < stage[-1]:

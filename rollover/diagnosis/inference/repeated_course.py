@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.phases import PEAK, phases_of
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.inference.discrepancy import correlation_times
 from rollover.diagnosis.settings import SETTINGS
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ground.law import REFERENCE_AREA, along
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.forward.filtering import filtered_like, rows_of
 from rollover.diagnosis.inference.bases import linear_b_splines
 from rollover.diagnosis.inference.newmark import newmark_response
@@ -75,7 +75,7 @@ class Way:
 def channels_of(way: Way, moves: Moves, e: Dataset, shift: float) -> Array:
     """Those changes as the recording would show them: stacked, whitened, (n, k); what is later stays as it ends."""
     z, v, a, felt = moves
-    shown = {
+    measured = {
         "ground/sinkage": z,
         "striker/position_z": -z,
         "striker/velocity_z": -v,
@@ -87,11 +87,11 @@ def channels_of(way: Way, moves: Moves, e: Dataset, shift: float) -> Array:
     at = np.clip(np.searchsorted(way.time, stamps) - 1, 0, way.time.size - 2)
     ahead = np.clip((stamps - way.time[at]) / TUNING.step, 0.0, 1.0)[:, None]
     begun = (stamps >= 0.0)[:, None]
-    nothing = np.zeros((stamps.size, z.shape[1]))
+    zero_force = np.zeros((stamps.size, z.shape[1]))
     found = {}
     for channel in e.recording.channels:
-        y = shown.get(channel)
-        found[channel] = nothing if y is None else begun * ((1.0 - ahead) * y[at] + ahead * y[at + 1])
+        y = measured.get(channel)
+        found[channel] = zero_force if y is None else begun * ((1.0 - ahead) * y[at] + ahead * y[at + 1])
     return np.asarray(e.marginalised(e.whitened(e.raw(filtered_like(found, e.recording, rows)))))
 
 

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from ground.empirical import MOST, TERMS
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.weak_form import Balance, balances
@@ -93,7 +94,7 @@ def fitted_law(
 
 def gains_of(base: Fitted, fitted: Fitted, groups: Sequence[Sequence[int]]) -> Array:
     """Held-out gain ln(E_before/E_after) of each condition, (conditions,)."""
-    before, after = held_out(base, groups).left, held_out(fitted, groups).left
+    before, after = held_out(base, groups).chi2, held_out(fitted, groups).chi2
     return np.array([0.5 * np.log(before[list(g)].sum() / after[list(g)].sum()) for g in groups])
 
 
@@ -156,8 +157,8 @@ def _candidate(subset: Subset, depth: float, speed: float) -> tuple[Candidate, l
     fixed: dict[str, Any] = {part: names[t] for part, t in zip(PARTS, subset.terms, strict=False)}
     search, x = {}, []
     for part, force in zip(PARTS, subset.forces, strict=False):
-        reach = TUNING.search_width * abs(float(force)) + 0.3 * largest
-        search[f"{part}_force"] = Search(float(force) - reach, float(force) + reach)
+        half_width = TUNING.search_width * abs(float(force)) + 0.3 * largest
+        search[f"{part}_force"] = Search(float(force) - half_width, float(force) + half_width)
         x.append(coordinate(float(force), search[f"{part}_force"]))
     family = Empirical.family
     fixed |= {"depth": depth, "speed": speed}

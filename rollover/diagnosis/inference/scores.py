@@ -9,9 +9,10 @@ import numpy as np
 
 from rollover.comparison.rating import Iso18571, iso18571
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.cross_validation import Held, held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, time_shift_step
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.cross_validation import HeldOutMisfit, held_out
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, time_shift_step
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.result import Score
 from rollover.diagnosis.settings import SETTINGS
 
@@ -24,16 +25,16 @@ class Judged:
     """How well an explanation meets recordings: scores by "training" and "held_out", what is held out, and of each."""
 
     scores: Mapping[str, Score]
-    held: Held
+    held: HeldOutMisfit
     by_recording: tuple[tuple[str, float], ...]
 
 
 def judged(problem: Problem, fitted: Fitted, validation: Sequence[Dataset], groups: Sequence[Sequence[int]]) -> Judged:
-    """Judge an explanation by recordings that were kept from it, or without such by leaving conditions out in turn."""
+    """Scores of an explanation on recordings held out, or without such by leaving conditions out in turn."""
     every = range(len(problem.dataset))
-    left = sum(b.normal()[2] for b in fitted.blocks)
+    chi2 = sum(b.normal()[2] for b in fitted.blocks)
     train = _score(
-        [_rated(problem, fitted, r) for r in every], float(np.sqrt(left / sum(b.size for b in fitted.blocks)))
+        [_rated(problem, fitted, r) for r in every], float(np.sqrt(chi2 / sum(b.size for b in fitted.blocks)))
     )
     held = held_out(fitted, groups)
     rows = [(e.name, float(v)) for e, v in zip(problem.dataset, held.nrmse, strict=True)]
@@ -41,7 +42,7 @@ def judged(problem: Problem, fitted: Fitted, validation: Sequence[Dataset], grou
         scores = {"training": train, "held_out": replace(train, nrmse=held.total)}
         return Judged(scores=scores, held=held, by_recording=tuple(rows))
     other = Problem(validation)
-    align(other)
+    estimate_time_shifts(other)
     apart = predicted(other, fitted)
     if apart is None:
         return Judged(scores={"training": train}, held=held, by_recording=tuple(rows))

@@ -36,7 +36,7 @@ class WrongCondition(Aside):
 
     summary = "What is stated of a recording is not what was tested."
 
-    def says(self) -> str:
+    def message(self) -> str:
         """The sentence on it."""
         stated = spoken(_speed(self.dataset))
         return (
@@ -105,8 +105,8 @@ def _deviation(r: int, x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
         return 0.0, math.inf
     A = np.column_stack([np.ones(x.size), x])
     line, *_ = np.linalg.lstsq(A[rest], y[rest], rcond=None)
-    left = y[rest] - A[rest] @ line
-    scatter = max(TUNING.least_scatter, math.sqrt(float(left @ left) / (left.size - 2)))
+    residual = y[rest] - A[rest] @ line
+    scatter = max(TUNING.least_scatter, math.sqrt(float(residual @ residual) / (residual.size - 2)))
     wide = float(A[r] @ np.linalg.solve(A[rest].T @ A[rest], A[r]))
     return float(y[r] - A[r] @ line), scatter * math.sqrt(1.0 + wide)
 

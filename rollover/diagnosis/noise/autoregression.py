@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal, noise_from_differences
-from rollover.diagnosis.forward.forward_model import first_impact_of
+from rollover.diagnosis.forward.interface import first_impact_of
 from rollover.diagnosis.noise.drift import is_recorder_noise
-from rollover.diagnosis.noise.outliers import without_outliers
-from rollover.diagnosis.noise.spectral_lines import lines, without
+from rollover.diagnosis.noise.spectral_lines import lines, without, without_outliers
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording.filters import attenuation, least_rate
 from rollover.recording.noise_floor import LENGTH, NoiseFloor, grown, noise_floor
@@ -32,7 +31,7 @@ ENOUGH = 2 * TUNING.least_windows * LENGTH  # samples that have as many
 
 
 def with_noise_of_quiet_stretches(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Dataset]:
-    """The evidence with its noise from the quiet stretches of the misfits (SI, stacked), recordings alike together."""
+    """The dataset with its noise from the quiet stretches of the misfits (SI, stacked), recordings alike together."""
     found = [list(e.signals) for e in dataset]
     humming = line_spectra(dataset, residuals)
     for members in signals_of_one_recorder(dataset):
@@ -49,10 +48,10 @@ def with_noise_of_quiet_stretches(dataset: Sequence[Dataset], residuals: Sequenc
             continue  # too short: what each says by itself stands
         for (r, k, s, _), misfit, value, size in zip(members, misfits, values, sizes, strict=True):
             own = _quieter([misfit], [value])
-            loud = (
+            noisy = (
                 own is not None and own.windows >= TUNING.least_windows and own.sigma > TUNING.own_level * common.sigma
             )
-            best = own if own is not None and loud else common
+            best = own if own is not None and noisy else common
             found[r][k] = replace(s, noise=best.sigma * size, ar=best.ar)
     found = [
         [replace(with_noise(s, s.noise, s.ar, e.model_error_of(s)), at_rest=(s.noise, s.ar)) for s in f]
@@ -87,7 +86,7 @@ def _before_the_impact(e: Dataset, s: Signal) -> slice:
 
 
 def with_noise_of_residuals(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Dataset]:
-    """The evidence with its noise from all of the misfits: an autoregression by least squares, recordings together."""
+    """The dataset with its noise from all of the misfits: an autoregression by least squares, recordings together."""
     found = [list(e.signals) for e in dataset]
     humming = line_spectra(dataset, residuals)
     shared: list[tuple[list[Member], list[Array]]] = []
@@ -188,7 +187,7 @@ def slow_noise_margin(memory: float, count: float) -> float:
 
 def is_bursting(s: Signal, misfit: Array, level: float) -> bool:
     """Whether a misfit (n,) is much less beside its bursts; digits that jump are none."""
-    return s.step == 0.0 and level > SETTINGS.noise.outliers.burst_ratio * float(
+    return s.step == 0.0 and level > SETTINGS.noise.outliers.outlier_ratio * float(
         np.sqrt(np.mean(without_outliers(misfit) ** 2))
     )
 
@@ -271,38 +270,38 @@ def _correlation(step: float, every: float, cfc: int) -> Array:
     return np.asarray(covariance / covariance[0])
 
 
-def autoregression(series: Sequence[Array], most: int = TUNING.longest_memory) -> tuple[float, tuple[float, ...]]:
+def autoregression(residuals: Sequence[Array], most: int = TUNING.longest_memory) -> tuple[float, tuple[float, ...]]:
     """Standard deviation and coefficients of one autoregression behind several series; its order by BIC."""
-    most = min(most, max(0, min(v.size for v in series) // 8))
-    return _driven(series, [(k, k) for k in range(1, most + 1)])
+    most = min(most, max(0, min(v.size for v in residuals) // 8))
+    return _driven(residuals, [(k, k) for k in range(1, most + 1)])
 
 
-def long_memory(series: Sequence[Array]) -> tuple[float, tuple[float, ...]]:
+def long_memory(residuals: Sequence[Array]) -> tuple[float, tuple[float, ...]]:
     """The same of a noise of 1/f: one coefficient for lag 1, for 2, for 3 and 4, for 5 to 8 and on, twice as far each.
 
     Heterogeneous autoregression, Corsi (2009), in octaves.
     """
-    most = min(v.size for v in series) // 8
-    return _driven(series, [(k // 2 + 1, k) for k in TUNING.octaves if k <= most], TUNING.coefficient_cost)
+    most = min(v.size for v in residuals) // 8
+    return _driven(residuals, [(k // 2 + 1, k) for k in TUNING.octaves if k <= most], TUNING.coefficient_cost)
 
 
 def _driven(
-    series: Sequence[Array], lags: Sequence[tuple[int, int]], dear: float | None = None
+    residuals: Sequence[Array], lags: Sequence[tuple[int, int]], dear: float | None = None
 ) -> tuple[float, tuple[float, ...]]:
     """An autoregression on means of the past over `lags` (first, last), on so many of the first as BIC asks for.
 
     Or as a criterion in which each costs as `dear`.
     """
     most = lags[-1][1] if lags else 0
-    sums = [np.concatenate([[0.0], np.cumsum(v)]) for v in series]
+    sums = [np.concatenate([[0.0], np.cumsum(v)]) for v in residuals]
     past = [
-        np.concatenate([v[most - last : v.size - last] for v in series])
+        np.concatenate([v[most - last : v.size - last] for v in residuals])
         if first == last
         else np.concatenate([c[most - first + 1 : c.size - first] - c[most - last : c.size - last - 1] for c in sums])
         / (last - first + 1)
         for first, last in lags
     ]
-    y = np.concatenate([v[most:] for v in series])
+    y = np.concatenate([v[most:] for v in residuals])
     n = y.size
     best: tuple[float, float, tuple[float, ...]] | None = None
     for order in range(len(lags) + 1):
@@ -346,7 +345,7 @@ def _quieter(misfits: Sequence[Array], own: Sequence[Array]) -> NoiseFloor | Non
     best, other = _floor(misfits), _floor(own)
     best = other if other.sigma < SETTINGS.data.dataset.own_noise_below * best.sigma else best
     beside = _floor([without_outliers(v) for v in misfits])
-    return beside if 0.0 < SETTINGS.noise.outliers.burst_ratio * beside.sigma < best.sigma else best
+    return beside if 0.0 < SETTINGS.noise.outliers.outlier_ratio * beside.sigma < best.sigma else best
 
 
 def _floor(values: Sequence[Array]) -> NoiseFloor:

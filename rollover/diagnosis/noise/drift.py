@@ -30,29 +30,29 @@ TUNING = SETTINGS.noise.drift
 
 def is_recorder_noise(signals: Sequence[tuple[Dataset, Signal, Array]]) -> bool:
     """Whether slow misfits (n,) of a channel, one of each recording, are its recorder's noise; not if none can tell."""
-    ends = [int(np.searchsorted(e.recording.time[s.rows], e.simulator.contact)) for e, s, _ in signals]
+    contacts = [int(np.searchsorted(e.recording.time[s.rows], e.simulator.contact)) for e, s, _ in signals]
     if len(signals) < TUNING.least_recordings or any(
-        n < TUNING.least_samples or w.size < 2 * n for n, (_, _, w) in zip(ends, signals, strict=True)
+        n < TUNING.least_samples or w.size < 2 * n for n, (_, _, w) in zip(contacts, signals, strict=True)
     ):
         return False
     if any(s.quiet[0] <= 0.0 for _, s, _ in signals):
         return False  # next to no noise at all everything is slow and loud
     before = np.array(
-        [leading_cosines(s, w[:n], TUNING.approach_terms) for n, (_, s, w) in zip(ends, signals, strict=True)]
+        [leading_cosines(s, w[:n], TUNING.drift_terms) for n, (_, s, w) in zip(contacts, signals, strict=True)]
     )
     if not is_slow(before):
         return False
     after = [
-        leading_cosines(s, part, TUNING.approach_terms)
-        for n, (_, s, w) in zip(ends, signals, strict=True)
+        leading_cosines(s, part, TUNING.drift_terms)
+        for n, (_, s, w) in zip(contacts, signals, strict=True)
         for part in _windows(w[n:], n)
     ]
     if is_louder(before, np.array(after)):
         return False
-    whole = [leading_cosines(s, w[n:], TUNING.contact_terms) for n, (_, s, w) in zip(ends, signals, strict=True)]
+    whole = [leading_cosines(s, w[n:], TUNING.contact_terms) for n, (_, s, w) in zip(contacts, signals, strict=True)]
     plain = [
         cosines(w.size - n, TUNING.contact_terms) @ w[n:] / math.sqrt(w.size - n)
-        for n, (*_, w) in zip(ends, signals, strict=True)
+        for n, (*_, w) in zip(contacts, signals, strict=True)
     ]
     # over the noise of each, or as it was read: the same offset is not as many times two noises
     return not (is_shared(np.array(whole)) or is_shared(np.array(plain)))

@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.forward.forward_model import first_impact_of
+from rollover.diagnosis.forward.interface import first_impact_of
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ TUNING = SETTINGS.noise.ensemble
 
 
 def with_sample_weights(e: Dataset, perturbed: Sequence[Mapping[str, Array]]) -> Dataset:
-    """The evidence with each sample's weight (D3); `perturbed` are the neighbours' deviations at its stamps."""
+    """The dataset with each sample's weight (D3); `perturbed` are the deviations of perturbed runs at its stamps."""
     first_impact = first_impact_of(e.simulator)
     perturbed = without_diverged(e, perturbed, first_impact)
     if not perturbed:
@@ -127,18 +127,18 @@ def heavy_tail(e: Dataset, residual: Array) -> HeavyTail | None:
     expected, beyond, inside = found
     share = _share(expected, beyond)
     slope = TUNING.state_size / (TUNING.state_size + beyond)
-    left = float(np.sum(residual[inside] ** 2))
-    return HeavyTail(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * left)
+    chi2 = float(np.sum(residual[inside] ** 2))
+    return HeavyTail(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * chi2)
 
 
-def leave_one_out_neighbours(e: Dataset) -> Array:
+def leave_one_out_scatter(e: Dataset) -> Array:
     """Neighbours (k, n), whitened, each weighed by what the others scatter: the recording is none of them either."""
     found = []
     for k, perturbed_run in enumerate(e.perturbed):
         others = [d for j, d in enumerate(e.perturbed) if j != k]
         alone = tuple(
             _weighted(e, replace(s, weight=None), np.stack([d[part] for d in others]))
-            if len(others) >= TUNING.least_neighbours
+            if len(others) >= TUNING.least_perturbed
             else s
             for s, part in e.spans()
         )
@@ -175,8 +175,8 @@ def _beyond(e: Dataset, squares: Array) -> tuple[float, float, NDArray[np.bool_]
         expected += own
     if len(over) < TUNING.least_channels:
         return None
-    left = float(np.sum(squares[inside]))
-    beyond = min(float(np.median(over)) * expected, left) - expected  # never more than there is
+    chi2 = float(np.sum(squares[inside]))
+    beyond = min(float(np.median(over)) * expected, chi2) - expected  # never more than there is
     return (expected, beyond, inside) if beyond > 0.0 else None
 
 
@@ -191,11 +191,11 @@ def gained(less: Array, slope: float) -> Array:
 
 def has_diverged(found: HeavyTail | None) -> bool:
     """Whether a recording diverges clearly from its run after an impact."""
-    return found is not None and found.share < TUNING.other_course
+    return found is not None and found.share < TUNING.diverged_share
 
 
 def p_value_of_divergence(others: int, of: int) -> float:
-    """p-value of so many recordings that diverge, where each may in `other_course_rate` of all cases."""
+    """p-value of so many recordings that diverge, where each may in `divergence_rate` of all cases."""
     from scipy.special import bdtrc
 
-    return float(bdtrc(others - 1, of, TUNING.other_course_rate)) if others else 1.0
+    return float(bdtrc(others - 1, of, TUNING.divergence_rate)) if others else 1.0

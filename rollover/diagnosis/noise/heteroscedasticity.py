@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
-from rollover.diagnosis.forward.forward_model import first_impact_of
+from rollover.diagnosis.forward.interface import first_impact_of
 from rollover.diagnosis.noise.autoregression import signals_of_one_recorder
 from rollover.diagnosis.settings import SETTINGS
 from rollover.recording.noise_floor import LENGTH, USUAL
@@ -28,7 +28,7 @@ TUNING = SETTINGS.noise.heteroscedasticity
 
 
 def with_variance_model(dataset: Sequence[Dataset]) -> list[Dataset]:
-    """The evidence with each sample's noise where that clearly grows with the value, (D10)."""
+    """The dataset with each sample's noise where that clearly grows with the value, (D10)."""
     found = [list(e.signals) for e in dataset]
     for members in signals_of_one_recorder(dataset):
         quiet = [t for r, _, s, _ in members if (t := _values_and_noise(dataset[r], s)) is not None and _varies(*t)]

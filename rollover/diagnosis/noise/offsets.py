@@ -39,8 +39,10 @@ class Zero:
     slow: float = 0.0  # sum of squares of its first cosines beyond the mean, over what noise lets expect of each
 
 
-def with_zeros(dataset: Sequence[Dataset], residuals: Sequence[Array], shifts: Sequence[float]) -> list[Dataset]:
-    """The evidence with its zeros set where they differ; `residuals` (stacked, SI) at time `shifts` (s)."""
+def with_offsets_removed(
+    dataset: Sequence[Dataset], residuals: Sequence[Array], shifts: Sequence[float]
+) -> list[Dataset]:
+    """The dataset without channel offsets that differ; `residuals` (stacked, SI) at time `shifts` (s)."""
     by: dict[str, list[Zero]] = {}
     for r, (e, residual, shift) in enumerate(zip(dataset, residuals, shifts, strict=True)):
         for k, (s, part) in enumerate(e.spans()):
@@ -57,11 +59,13 @@ def with_zeros(dataset: Sequence[Dataset], residuals: Sequence[Array], shifts: S
                 zero = Zero(r=r, k=k, off=float(early.mean()), error=float(error), slow=slow)
                 by.setdefault(s.channel, []).append(zero)
     able = [
-        zeros for zeros in by.values() if len(zeros) >= TUNING.least_recordings and all(z.error > 0.0 for z in zeros)
+        offsets
+        for offsets in by.values()
+        if len(offsets) >= TUNING.least_recordings and all(z.error > 0.0 for z in offsets)
     ]
     found = [list(e.signals) for e in dataset]
     if _differ(able) and _are_stationary(able):
-        for z, off in ((z, off) for zeros in able for z, off in zip(zeros, _own(zeros), strict=True)):
+        for z, off in ((z, off) for offsets in able for z, off in zip(offsets, _own(offsets), strict=True)):
             s = found[z.r][z.k]
             found[z.r][z.k] = replace(s, values=s.values - off, zero=off, zero_error=z.error)
     return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
@@ -85,7 +89,7 @@ def _are_stationary(every: Sequence[Sequence[Zero]]) -> bool:
     """Whether zeros stand still: what wanders before the first contact, as noise of 1/f, has none."""
     from scipy.special import chdtrc
 
-    slow = [z.slow for zeros in every for z in zeros]
+    slow = [z.slow for offsets in every for z in offsets]
     return float(chdtrc(TUNING.wave_terms * len(slow), sum(slow))) > TUNING.slow_p_value
 
 
@@ -94,21 +98,21 @@ def _differ(every: Sequence[Sequence[Zero]]) -> bool:
     from scipy.special import chdtrc
 
     squares = sum(float(np.sum((apart / error) ** 2)) for apart, error in map(_deviation_from_mean, every))
-    return bool(every) and float(chdtrc(sum(len(zeros) - 1 for zeros in every), squares)) < TUNING.differ_p_value
+    return bool(every) and float(chdtrc(sum(len(offsets) - 1 for offsets in every), squares)) < TUNING.differ_p_value
 
 
-def _own(zeros: Sequence[Zero]) -> list[float]:
+def _own(offsets: Sequence[Zero]) -> list[float]:
     """What is taken off each: all of it, but for what they share beyond what such zeros share by chance."""
     from scipy.stats import t
 
-    off, n = np.array([z.off for z in zeros]), len(zeros)
+    off, n = np.array([z.off for z in offsets]), len(offsets)
     chance = 2.0 * float(t.sf(abs(off.mean()) * np.sqrt(n) / max(float(off.std(ddof=1)), 1e-300), n - 1))
-    return [float(v) for v in (_deviation_from_mean(zeros)[0] if chance < TUNING.shared_p_value else off)]
+    return [float(v) for v in (_deviation_from_mean(offsets)[0] if chance < TUNING.shared_p_value else off)]
 
 
-def _deviation_from_mean(zeros: Sequence[Zero]) -> tuple[Array, Array]:
+def _deviation_from_mean(offsets: Sequence[Zero]) -> tuple[Array, Array]:
     """How far each lies off the mean of all, and its standard error, SI."""
-    off, error = np.array([z.off for z in zeros]), np.array([z.error for z in zeros])
+    off, error = np.array([z.off for z in offsets]), np.array([z.error for z in offsets])
     return off - np.average(off, weights=error**-2.0), error
 
 

@@ -1,20 +1,23 @@
-"""Lines in the spectrum of a channel's residual: a hum is no noise, however strong, and no autoregression fits it.
+"""What is in a residual beside broadband noise and physics: spectral lines, as of mains hum, and outliers.
 
 The periodograms of all recordings, each over its own running median times 1/ln 2, add up at a frequency to a sum that
 is Gamma(R) distributed on noise of any smooth spectrum; a line is where that is beyond chance at all frequencies.
+No autoregression fits a line. Outliers, as of a loose contact, leave no window quiet, and are not noise for that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.settings import SETTINGS
+from rollover.recording.noise_floor import LENGTH, USUAL
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.noise.spectral_lines
+OUTLIERS = SETTINGS.noise.outliers
 
 
 def lines(times: Sequence[Array], misfits: Sequence[Array]) -> tuple[float, ...]:
@@ -84,3 +87,31 @@ def _over_median(t: Array, w: Array, at: Array) -> Array:
     usual = median_filter(P, 2 * TUNING.padding * TUNING.median_half_width + 1, mode="nearest") / np.log(2.0)
     f = np.arange(P.size) / (TUNING.padding * n * (even[1] - even[0]))
     return np.asarray(np.interp(at, f, P / np.maximum(usual, 1e-300)))
+
+
+def without_outliers(values: Array) -> Array:
+    """Evenly spaced values (n,), those far from their neighbours replaced by the middle one of these.
+
+    As they are where so many lie far off that these are the rule.
+    """
+    from scipy.ndimage import median_filter
+
+    if values.size < LENGTH:
+        return values
+    middle = median_filter(values, OUTLIERS.median_width, mode="nearest")
+    apart = np.abs(values - middle)
+    usual = USUAL * float(np.median(apart))
+    far = apart > OUTLIERS.outlier_distance * usual
+    return np.where(far, middle, values) if usual > 0.0 and far.mean() < 1.0 - OUTLIERS.least_clean_share else values
+
+
+def outlier_p_value(channels: Iterable[Array]) -> float:
+    """p-value of as many samples far off, of noise units (n,) of each channel, were one in a hundred so by chance."""
+    from scipy.special import bdtrc
+
+    found = []
+    for w in channels:
+        if w.size:
+            far = np.abs(w) > OUTLIERS.outlier_distance * max(1.0, USUAL * float(np.median(np.abs(w))))
+            found.append(float(bdtrc(far.sum() - 1, w.size, OUTLIERS.outlier_rate)))
+    return min([1.0, *(len(found) * p for p in found)])

@@ -1,4 +1,4 @@
-"""What a model of one's own declares: channels, parameters that are always fitted, terms that may be missing."""
+"""What a model of one's own declares, and its file: channels, parameters that are always fitted, candidate terms."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import inspect
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from string import Formatter
+from types import ModuleType
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -16,8 +18,12 @@ from ground.quantity import Quantity
 from rollover.effects import Effect
 from rollover.effects.sensor import ORDER as SENSORS
 from rollover.spec.channels import UNITS, describe, is_known
+from rollover.spec.document import shipped_folder
+from rollover.system import own_code
 from rollover.system.arguments import is_finite_number
 from rollover.system.errors import Fault, InputError, hint
+
+FOLDER, OBJECT = "models", "model"
 
 Array = NDArray[np.float64]
 
@@ -270,3 +276,35 @@ def _wrong_parameter(path: str, name: object, p: object, *, is_always: bool) -> 
         yield f"{path}.null", f"of a parameter that is always fitted, got {p.null:g}; a null is a term's"
     if not is_always and p.null is not None and p.null == p.start:
         yield f"{path}.start", f"the same as its null, got {p.start:g}; a typical value of the term is needed"
+
+
+def found_at(name: str | Path) -> Path:
+    """Path of a model's file, or of a shipped one by its name. Raises `InputError` where there is none."""
+    path = Path(name)
+    if path.is_file() or path.suffix == ".py":
+        return path
+    shipped = {p.stem: p for p in sorted((shipped_folder() / FOLDER).glob("*.py"))}
+    if str(name) in shipped:
+        return shipped[str(name)]
+    message = f"no such model, got {str(name)!r}; a Python file is needed, or a shipped one: {hint(str(name), shipped)}"
+    raise InputError(Fault(file="--model", message=message))
+
+
+def load_model(path: Path) -> ForwardModel:
+    """The object `model` of a Python file, checked. Raises `InputError`."""
+    return declared(getattr(own_code.load_one(FOLDER, path, _examined), OBJECT), str(path))
+
+
+def hashes(path: Path) -> dict[str, str]:
+    """SHA-256 of a model's file by its name, as a result states it."""
+    known = own_code.hashes(FOLDER)
+    return {name: known[name] for name in (path.name, str(path.resolve())) if name in known}
+
+
+def _examined(module: ModuleType) -> str:
+    """What is wrong with a module that should hold a model."""
+    return (
+        ""
+        if hasattr(module, OBJECT)
+        else f"holds no model; an object named {OBJECT!r} is needed, see rollover.ForwardModel"
+    )

@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 
 from rollover.diagnosis import io
-from rollover.diagnosis.conclusion import TUNING, Asked, weighed
+from rollover.diagnosis.conclusion import TUNING, Asked, conclusion_of
 from rollover.diagnosis.data.dataset import left_out
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.forward.failed_model import FailedModelError
+from rollover.diagnosis.fit.step import Inquiry
+from rollover.diagnosis.forward.interface import FailedModelError
+from rollover.diagnosis.grades import cannot_tell
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.invariants import checked
 from rollover.diagnosis.own_model.declaration import BASELINE, ForwardModel, declared
 from rollover.diagnosis.own_model.prepare import begun, prepared_for, with_noise
 from rollover.diagnosis.own_model.tables import candidates_of_model, tables
-from rollover.diagnosis.power import cannot_tell
 from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.recording import Recording
 from rollover.system.errors import Fault, InputError
 
@@ -67,7 +67,7 @@ def _diagnosed(model: ForwardModel, asked: Asked, tolerance: float) -> Diagnosis
     names, executor = list(asked.recordings), asked.executor
     every, notes = prepared_for(model, asked.recordings)
     every = with_noise(model, [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every])
-    found, kept = ([e for e in every if (e.name in asked.hold_out) == held] for held in (False, True))
+    found, validation = ([e for e in every if (e.name in asked.hold_out) == held] for held in (False, True))
     if sum(e.count for e in found) < TUNING.least_samples:
         return cannot_tell(every, names, notes, asked.began)
     problem = Problem(found)
@@ -76,7 +76,7 @@ def _diagnosed(model: ForwardModel, asked: Asked, tolerance: float) -> Diagnosis
     if base is None:
         return cannot_tell(every, names, [*notes, "the model could not be fitted"], asked.began)
     groups = left_out(found)
-    if len(groups) < 2 and not kept:
+    if len(groups) < 2 and not validation:
         notes.append("one recording only: what stands as held out is predicted by the fit to it")
     inquiry = Inquiry(
         problem=problem,
@@ -86,7 +86,7 @@ def _diagnosed(model: ForwardModel, asked: Asked, tolerance: float) -> Diagnosis
         say=asked.say,
         executor=executor,
     )
-    concluded = weighed(asked, inquiry, base, kept, acts="model", notes=notes)
+    concluded = conclusion_of(asked, inquiry, base, validation, acts="model", notes=notes)
     fitted = concluded.explanation.fitted
     if not model.parameters:
         return reported(concluded)

@@ -1,4 +1,4 @@
-"""Recordings that drive a model: inputs at every stamp, outputs as evidence, noise; and the model tried on them."""
+"""Recordings that drive a model: inputs at every stamp, outputs as datasets, noise; and the model tried on them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal, dataset_of
 from rollover.diagnosis.data.quantisation import with_quantisation, without_spikes
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import ended
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.own_model.declaration import ForwardModel, conditions_of
@@ -25,7 +26,7 @@ TUNING = SETTINGS.fit.own_model
 
 
 def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tuple[list[Dataset], list[str]]:
-    """Recordings as evidence, and what is to be said of them. Raises `InputError` for those that cannot drive it.
+    """Recordings as datasets, and notes on them. Raises `InputError` for those that cannot drive it.
 
     Raises `FailedModelError` for a model that fails, or does not keep to what it declares, where fits begin.
     """
@@ -54,7 +55,7 @@ def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tu
 
 
 def with_noise(model: ForwardModel, every: Sequence[Dataset]) -> list[Dataset]:
-    """The evidence with its noise: as recordings state it, else from quiet stretches of all together."""
+    """The dataset with its noise: as recordings state it, else from quiet stretches of all together."""
     problem = Problem(every)
     base = begun(model, problem)
     if base is None:
@@ -86,17 +87,17 @@ def begun(model: ForwardModel, problem: Problem) -> Fitted | None:
         (*start[:k], min(max(x + d, 0.0), 1.0), *start[k + 1 :]) for k, x in enumerate(start) for d in TUNING.beside
     ]
     short = [problem.fit(baseline, x, rounds=problem.effort.short, no_jacobian=True) for x in (start, *beside)]
-    best = min((f for f in short if f is not None), key=lambda f: f.left, default=None)
+    best = min((f for f in short if f is not None), key=lambda f: f.chi2, default=None)
     if best is None or not baseline:
         return best
     for _ in range(TUNING.repeats):
         again = problem.fit(baseline, best.x)
-        if again is None or again.left > best.left - TUNING.least_gain:
+        if again is None or again.chi2 > best.chi2 - TUNING.least_gain:
             break
         best = again
     alone = [problem.fit(baseline, best.x, only=[r]) for r in range(len(problem.dataset))]
-    met = min((f for f in alone if f is not None), key=lambda f: f.left / f.blocks[0].residual.size, default=best)
-    placed = replace(baseline[0], places=tuple(dict.fromkeys([start, met.x])))
+    met = min((f for f in alone if f is not None), key=lambda f: f.chi2 / f.blocks[0].residual.size, default=best)
+    placed = replace(baseline[0], points=tuple(dict.fromkeys([start, met.x])))
     return ended(problem, problem.again(replace(best, candidates=(placed,))))
 
 
@@ -160,8 +161,8 @@ def _tried(simulator: ModelSimulator) -> None:
         if moved is not None and all(np.array_equal(first[c], moved[c]) for c in first):
             continue  # it may have no part in this recording
         beside = {f"{term.id}.{n}": p.low for n, p in term.parameters.items() if p.null is None}
-        nothing = simulator.run({**beside, **nulls})
-        if nothing is None or any(not np.array_equal(first[c], nothing[c]) for c in first):
+        at_null = simulator.run({**beside, **nulls})
+        if at_null is None or any(not np.array_equal(first[c], at_null[c]) for c in first):
             raise simulator.refused(
                 f"{term.id} does something at its null; with its strength there no output may change"
             )

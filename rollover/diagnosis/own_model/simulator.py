@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.forward.failed_model import FailedModelError
+from rollover.diagnosis.forward.interface import FailedModelError
 from rollover.diagnosis.own_model.declaration import BASELINE, ForwardModel, conditions_of, file_of, values_of
 from rollover.diagnosis.own_model.tables import enter, stretches
 from rollover.diagnosis.settings import SETTINGS
@@ -19,7 +19,7 @@ from rollover.system.errors import Fault
 
 Array = NDArray[np.float64]
 PREFIX = "effects."
-KEPT = SETTINGS.forward.drop.kept_predictions
+CACHED = SETTINGS.forward.drop.cached_predictions
 PART = SETTINGS.forward.model_part
 
 
@@ -65,7 +65,7 @@ class ModelSimulator:
         """Outputs before sensors with values exchanged; None where there is no solution. Raises `FailedModelError`."""
         key = tuple(sorted(values.items()))
         if key not in self._runs:
-            if len(self._runs) >= KEPT:
+            if len(self._runs) >= CACHED:
                 self._runs.pop(next(iter(self._runs)))
             self._runs[key] = self.called(values)
         return self._runs[key]
@@ -109,8 +109,8 @@ class ModelSimulator:
                 yield f"simulate returned no numbers as {name}, got {made[name]!r}; floats are needed"
                 continue
             if values.shape != self.recording.time.shape:
-                needed = self.recording.time.shape
-                yield f"simulate returned {name} of shape {values.shape}; {needed} is needed, one a stamp"
+                shape = self.recording.time.shape
+                yield f"simulate returned {name} of shape {values.shape}; {shape} is needed, one a stamp"
 
     def perturbed(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1

@@ -1,18 +1,26 @@
-"""The cheapest test that tells two effects apart: condition, then one more sensor, then a higher rate."""
+"""The cheapest test that tells two effects apart: by a plan alone, or by two fits to recordings at hand.
+
+Conditions are varied first, then one sensor is added, then the rate is raised.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.planning.planned import Instruments, planned
+from rollover.diagnosis.planning.planned import Instruments, planned, showing
 from rollover.diagnosis.planning.separation import Tests
+from rollover.diagnosis.planning.strength import choice
 from rollover.diagnosis.result import NextTest
 from rollover.diagnosis.settings import SETTINGS
-from rollover.dynamics.drop_test import COLUMNS
+from rollover.dynamics.drop_test import COLUMNS, unfit
 from rollover.effects import EFFECTS
 from rollover.scenario import Scenario
 from rollover.spec.document import paths, value_at
@@ -38,14 +46,14 @@ class Advice:
     tried: tuple[NextTest, ...]
     known: str
 
-    def says(self) -> str:
+    def message(self) -> str:
         """The sentence."""
         one, other = self.effects
         now = f"{one} and {other}: told apart with {self.probability:.0%}"
         if self.best is None:
             return f"{now} as planned."
         seldom = "" if self.is_enough else "; no single test that was looked at is sure to"
-        return f"{now} as planned; beside it {self.best.says()}{seldom}."
+        return f"{now} as planned; beside it {self.best.message()}{seldom}."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +110,7 @@ def advice(grid: Grid, one: Placed, other: Placed, probability: float) -> Advice
     known = EFFECTS[a.id].rivals.get(b.id) or EFFECTS[b.id].rivals.get(a.id) or ""
     tried: list[NextTest] = []
     if probability >= TUNING.told_apart:
-        return _told((a.key, b.key), probability, None, tried, known)
+        return _advice((a.key, b.key), probability, None, tried, known)
     for level in grid.levels():
         for instruments in level:
             for value in grid.values():
@@ -115,7 +123,7 @@ def advice(grid: Grid, one: Placed, other: Placed, probability: float) -> Advice
         best = cheapest(tried)
         if best is not None and best.probability >= TUNING.told_apart:
             break
-    return _told((a.key, b.key), probability, cheapest(tried), tried, known)
+    return _advice((a.key, b.key), probability, cheapest(tried), tried, known)
 
 
 def chance_of(dataset: Sequence[Dataset], one: Placed, other: Placed) -> float:
@@ -126,10 +134,60 @@ def chance_of(dataset: Sequence[Dataset], one: Placed, other: Placed) -> float:
     return sum(known) / len(known) if known else 0.5
 
 
-def _told(
+def _advice(
     effects: tuple[str, str], probability: float, best: NextTest | None, tried: Sequence[NextTest], known: Any
 ) -> Advice:
     is_enough = max(probability, 0.0 if best is None else best.probability) >= TUNING.told_apart
     return Advice(
         effects=effects, probability=probability, best=best, is_enough=is_enough, tried=tuple(tried), known=known
     )
+
+
+def next_test(scenario: Scenario, dataset: Sequence[Dataset], one: Fitted, other: Fitted) -> NextTest | None:
+    """The gentlest drop that would choose between two fits to the same recordings, else the surest; None of no drop.
+
+    What it adds is the misfit that one leaves, refitted to the recordings and to what the other foretells of the drop.
+    """
+    if unfit(scenario):
+        return None
+    path = varied(scenario)
+    instruments, conditions = _as_recorded(dataset), dict(dataset[0].recording.conditions)
+    grid = Grid(scenario=scenario, dataset=tuple(dataset), instruments=instruments, path=path)
+    alone = {id(f): _refitted(dataset, f) for f in (one, other)}
+    tried = []
+    for value in grid.values():
+        extra = planned(scenario, {**conditions, path: value}, instruments)
+        if extra is None:
+            continue
+        chances = []
+        for truth, rival in ((one, other), (other, one)):
+            predicted = Problem([extra]).predicted_with_jumps(0, truth.candidates, truth.x, 0.0)
+            before = alone[id(rival)]
+            after = None if predicted is None else _refitted([*dataset, showing(extra, predicted)], rival)
+            if before is not None and after is not None:
+                chances.append(choice(max(after - before, 0.0)))
+        if len(chances) == 2:
+            tried.append(grid.test(value, tuple(instruments.noise), instruments.rate, sum(chances) / 2.0))
+    return cheapest(tried)
+
+
+def _refitted(dataset: Sequence[Dataset], fitted: Fitted) -> float | None:
+    """What the effects of a fit leave of recordings, the first of them those it was made to."""
+    shifts = [b.shift for b in fitted.blocks]
+    shifts += [0.0] * (len(dataset) - len(shifts))
+    found = Problem(dataset).fit(fitted.candidates, fitted.x, rounds=TUNING.rounds, shifts=shifts, width=1)
+    return None if found is None else found.total
+
+
+def _as_recorded(dataset: Sequence[Dataset]) -> Instruments:
+    """Instruments as those of the recordings, the middle ones: noise of each channel, rate, what the model misses."""
+    noise: dict[str, list[float]] = {}
+    misses: list[float] = []
+    for e in dataset:
+        for s in e.signals:
+            noise.setdefault(s.channel, []).append(s.noise * float(np.sqrt(e.averaged)))
+            misses.append(np.sqrt(max(e.model_error_of(s) ** 2 - SETTINGS.data.dataset.model_error**2, 0.0)))
+    steps = [float(np.median(np.diff(e.recording.time))) / e.averaged for e in dataset]
+    middle: Mapping[str, Any] = {channel: float(np.median(each)) for channel, each in noise.items()}
+    rate = float(f"{1.0 / float(np.median(steps)):.4g}")
+    return Instruments(noise=middle, rate=rate, tolerance=float(np.median(misses)), gain=0.0)

@@ -4,22 +4,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
+from rollover.assessment.results import plain, versions
 from rollover.diagnosis.fit.parameterisation import Candidate, is_limit, null_of
 from rollover.diagnosis.forward.forward_model import set_up
-from rollover.diagnosis.planning.chances import detection, needed, of_one
 from rollover.diagnosis.planning.next_test import Advice, Grid, advice, varied
 from rollover.diagnosis.planning.planned import Instruments, planned
 from rollover.diagnosis.planning.separation import Apart, Tests
-from rollover.diagnosis.planning.strength import place_where_it_acts, strength_with, usual
+from rollover.diagnosis.planning.strength import (
+    detection,
+    of_one,
+    point_where_it_acts,
+    required_noncentrality,
+    strength_with,
+    usual,
+)
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import COLUMNS, unfit
 from rollover.effects import EFFECTS, spoken, units_of
 from rollover.scenario import Scenario
 from rollover.system.errors import Fault, InputError, hint
+
+FORMAT = "rollover-plan/1"
+JSON, PAGE = "plan.json", "report.html"
+FILES = (JSON, PAGE)
 
 TUNING = SETTINGS.planning
 
@@ -119,14 +130,14 @@ def plan(
     every = candidates_of(dataset, scenario.effects, "drop", scenario, size_of(set_up(scenario, dataset[0].recording)))
     chosen = _chosen(every, between)
     size = of_one(TUNING.false_alarm, len(every))
-    enough = needed(TUNING.power, size)
+    enough = required_noncentrality(TUNING.power, size)
     say(f"{len(chosen)} effects in {len(dataset)} drops")
     effects, judged = [], {}
     for c in chosen:
-        found, place = _detectable(tests, c, size, enough)
+        found, point = _detectable(tests, c, size, enough)
         effects.append(found)
-        if place is not None:
-            judged[c.key] = (c, place)
+        if point is not None:
+            judged[c.key] = (c, point)
     asked = between or [(a, b) for a in judged for b in judged if a < b]
     wanted = dict.fromkeys(pair for a, b in asked for pair in ((a, b), (b, a)))
     say(f"{len(wanted)} pairs")
@@ -204,7 +215,7 @@ def _detectable(tests: Tests, c: Candidate, size: float, enough: float) -> tuple
 
     name, _ = null_of(c)
     own, unit = usual(c), units_of(EFFECTS[c.id], c.channel)[name]
-    at = place_where_it_acts(c, shows)
+    at = point_where_it_acts(c, shows)
     least = None if at is None else strength_with(c, at, shows, enough)
     judged = None if at is None or least is None else strength_with(c, least, shows, TUNING.clearly * enough) or least
     values = {} if judged is None else c.values(judged)
@@ -240,3 +251,21 @@ def _closest(pairs: Sequence[Pair]) -> list[tuple[str, str]]:
         mean[a, b] = _mean(pairs, a, b)
     close = sorted((value, pair) for pair, value in mean.items() if value < TUNING.told_apart)
     return [(a, b) for _, (a, b) in close[: TUNING.few]]
+
+
+def json_of(found: Plan, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """What plan.json says, bare JSON values; `about` names what was asked."""
+    fields = asdict(found)
+    effects, pairs, tests = (fields.pop(key) for key in ("effects", "pairs", "next_tests"))
+    answer: dict[str, Any] = plain(
+        {
+            "format": FORMAT,
+            **(about or {}),
+            **fields,
+            "effects": effects,
+            "pairs": [{**p, "is_told_apart": p["probability"] >= found.told_apart} for p in pairs],
+            "next_tests": tests,
+            "versions": versions(),
+        }
+    )
+    return answer

@@ -86,7 +86,7 @@ def _signal(channel: str, recording: Recording, values: Array, tolerance: float)
     if miss > 0.0:
         time = recording.time
         memory = TUNING.memory * float(time[-1] - time[0]) / float(np.median(np.diff(time)))  # in samples
-        ar = coloured(white, miss, memory, min(TUNING.order, time.size // 4))
+        ar = autoregressive(white, miss, memory, min(TUNING.order, time.size // 4))
     return Signal(
         channel=channel,
         rows=np.arange(values.size),
@@ -98,7 +98,7 @@ def _signal(channel: str, recording: Recording, values: Array, tolerance: float)
     )
 
 
-def coloured(white: float, miss: float, memory: float, order: int) -> tuple[float, ...]:
+def autoregressive(white: float, miss: float, memory: float, order: int) -> tuple[float, ...]:
     """Autoregression of white noise beside an error that is remembered for `memory` samples, by Yule and Walker."""
     from scipy.linalg import solve_toeplitz
 
@@ -129,8 +129,8 @@ def showing(e: Dataset, raw: Array) -> Dataset:
 
 def only(e: Dataset, channels: Sequence[str]) -> Dataset:
     """The recording of some of its channels alone."""
-    kept = [s.channel in channels for s in e.signals]
-    rows = np.concatenate([np.full(s.rows.size, k) for s, k in zip(e.signals, kept, strict=True)])
+    retained = [s.channel in channels for s in e.signals]
+    rows = np.concatenate([np.full(s.rows.size, k) for s, k in zip(e.signals, retained, strict=True)])
     nuisance = None if e.nuisance is None else e.nuisance[rows]
-    signals = tuple(s for s, k in zip(e.signals, kept, strict=True) if k)
+    signals = tuple(s for s, k in zip(e.signals, retained, strict=True) if k)
     return replace(e, signals=signals, nuisance=nuisance)

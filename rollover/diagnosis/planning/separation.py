@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import without_shift_direction
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.planning.chances import choice
 from rollover.diagnosis.planning.planned import showing
-from rollover.diagnosis.planning.strength import scaled
+from rollover.diagnosis.planning.strength import choice, scaled
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
@@ -64,7 +63,7 @@ class Tests:
             )
         return self._moved[key]
 
-    def shown(self, c: Candidate, x: tuple[float, ...]) -> tuple[Problem, float] | None:
+    def recorded(self, c: Candidate, x: tuple[float, ...]) -> tuple[Problem, float] | None:
         """The recordings as they would be with an effect and without noise, and what nothing leaves of it there.
 
         None if it cannot be simulated.
@@ -74,33 +73,35 @@ class Tests:
             raws = [self.problem.predicted_with_jumps(r, (c,), x, 0.0) for r in range(len(self.dataset))]
             made = [showing(e, raw) for e, raw in zip(self.dataset, raws, strict=True) if raw is not None]
             problem = Problem(made)
-            nothing = problem.fit((), (), rounds=TUNING.rounds) if len(made) == len(raws) else None
-            self._shown[key] = None if nothing is None else (problem, nothing.total)
+            unfitted = problem.fit((), (), rounds=TUNING.rounds) if len(made) == len(raws) else None
+            self._shown[key] = None if unfitted is None else (problem, unfitted.total)
         return self._shown[key]
 
     def unexplained(self, c: Candidate, x: tuple[float, ...]) -> float:
         """Noncentrality of an effect beside nothing but clocks, gains and uncertain values; 0 if it cannot be made."""
-        shown = self.shown(c, x)
-        return 0.0 if shown is None else shown[1]
+        recorded = self.recorded(c, x)
+        return 0.0 if recorded is None else recorded[1]
 
     def apart(self, c: Candidate, x: tuple[float, ...], rival: Candidate) -> Apart | None:
         """An effect at x through a rival that is refitted; None where the effect cannot be simulated.
 
         Secants from nothing say where the rival's fits begin, and are the answer where these are beyond doubt.
         """
-        found = self.shown(c, x)
+        found = self.recorded(c, x)
         if found is None:
             return None
-        shown, far = found
+        recorded, far = found
         nearest = self._nearest(c, x, rival)
         if not nearest or nearest[0][0] > TUNING.beyond_doubt:
-            least = min([far, *(left for left, _ in nearest)])
+            least = min([far, *(chi2 for chi2, _ in nearest)])
             x_rival = nearest[0][1] if nearest else ()
         else:
-            fits = [shown.fit((rival,), place, rounds=TUNING.rounds, width=1) for _, place in nearest[: TUNING.starts]]
+            fits = [
+                recorded.fit((rival,), point, rounds=TUNING.rounds, width=1) for _, point in nearest[: TUNING.starts]
+            ]
             best = min((f for f in fits if f is not None), key=lambda f: f.total, default=None)
             if best is not None:  # noise-free, a search ends where a round gains less than noise would hide: too early
-                ended = shown.fit((rival,), best.x, rounds=TUNING.rounds, finely=True)
+                ended = recorded.fit((rival,), best.x, rounds=TUNING.rounds, finely=True)
                 best = best if ended is None else min(best, ended, key=lambda f: f.total)
             least, x_rival = (far, ()) if best is None else (min(best.total, far), best.x)
         return Apart(noncentrality=least, probability=choice(least, far), x=x_rival)
@@ -111,15 +112,15 @@ class Tests:
         if d is None:
             return []
         found = []
-        for place in dict.fromkeys([*rival.starts(), *rival.probes()]):
-            s = self.moved(rival, place)
+        for point in dict.fromkeys([*rival.starts(), *rival.scan_points()]):
+            s = self.moved(rival, point)
             size = 0.0 if s is None else float(s @ s)
             if s is None or size <= 0.0:
                 continue
             along = float(d @ s) / size
-            there = scaled(rival, place, along)
+            there = scaled(rival, point, along)
             if there is None:  # nothing to scale from: the place itself
-                found.append((float((d - s) @ (d - s)), place))
+                found.append((float((d - s) @ (d - s)), point))
             else:
                 found.append((float(d @ d) - along**2 * size, there))
         return sorted(found)

@@ -59,12 +59,14 @@ def candidates_of(
         search = {p: s for p, s in there.items() if p not in kind.shapes}
         if not search:
             continue
-        shapes = {p: there[p] for p in kind.shapes if p in there}
+        secondary = {p: there[p] for p in kind.shapes if p in there}
         unlike = {} if scenario is None else {p: _null_coordinate(kind, p, s, scenario) for p, s in search.items()}
         null = None if acts == "drop" else tuple(unlike.get(p) for p in search)
         held = {p: physical(x, search[p]) for p, x in unlike.items() if x is not None and kind.null.get(p) is None}
         found.append(
-            Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes, null=null, own=held)
+            Candidate(
+                id=name, kind=kind.kind, family=kind.family, search=search, secondary=secondary, null=null, own=held
+            )
         )
     return found
 
@@ -72,20 +74,20 @@ def candidates_of(
 def of_sensors(dataset: Sequence[Dataset]) -> list[Candidate]:
     """Effects of sensors that can act on what was recorded, once for each channel."""
     spans: dict[str, float] = {}
-    ends: dict[str, float] = {}
+    bounds: dict[str, float] = {}
     for e in dataset:
         for s in e.signals:
             spans[s.channel] = max(spans.get(s.channel, 0.0), s.span)
-            ends[s.channel] = max(ends.get(s.channel, 0.0), s.end)
+            bounds[s.channel] = max(bounds.get(s.channel, 0.0), s.end)
     times = _times(dataset)
-    heard = [Heard(channel, spans, times.get(channel, 1.0), ends[channel]) for channel in spans]
+    heard = [Heard(channel, spans, times.get(channel, 1.0), bounds[channel]) for channel in spans]
     return [
         Candidate(
             id=name,
             kind=kind.kind,
             family=kind.family,
             search={p: s for p, s in ranges.items() if p not in kind.shapes},
-            shapes={p: s for p, s in ranges.items() if p in kind.shapes},
+            secondary={p: s for p, s in ranges.items() if p in kind.shapes},
             channel=of.channel,
         )
         for name, kind in EFFECTS.items()
@@ -135,8 +137,8 @@ def _sized(search: Search, powers: tuple[float, float] | None, size: tuple[float
     mass, face = (0.0, 0.0) if powers is None else powers
     whole = size[0] ** mass * size[1] ** face
     smaller = min(size[0], 1.0) ** mass * min(size[1], 1.0) ** face
-    ends = (search.low * f for f in (whole, smaller)), (search.high * f for f in (whole, smaller))
-    return Search(min(ends[0]), max(ends[1]), search.scale)
+    bounds = (search.low * f for f in (whole, smaller)), (search.high * f for f in (whole, smaller))
+    return Search(min(bounds[0]), max(bounds[1]), search.scale)
 
 
 def _widened(search: Search, null: float | None) -> Search:

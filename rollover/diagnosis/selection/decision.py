@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import at_an_end, first_effect_last
-from rollover.diagnosis.fit.local_search import all_but_one, left_at, without_effect
-from rollover.diagnosis.fit.parameterisation import Candidate, is_one_sensor, with_slices
-from rollover.diagnosis.fit.step import Groups, Phases, Step
-from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated, matters
-from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
+from rollover.diagnosis.data.phases import Phases
+from rollover.diagnosis.fit.cross_validation import Groups, held_out
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, at_an_end, first_effect_last
+from rollover.diagnosis.fit.local_search import without_effect
+from rollover.diagnosis.fit.parameterisation import is_one_sensor, with_slices
+from rollover.diagnosis.fit.step import Inquiry, Step
+from rollover.diagnosis.inference.lack_of_fit import Mismatch, is_enough, is_tolerated, matters, mismatch_of
 from rollover.diagnosis.result import Verdict
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.ensemble_validation import counted_in_full, significant_by_wald
+from rollover.diagnosis.selection.explanation import Explanation, kind_of, strongest, with_conditions_refitted
 from rollover.diagnosis.selection.flexibility import is_a_curve, is_flexible_soil, is_over_flexible, is_straight_line
 from rollover.diagnosis.selection.forward_step import largest_change
 from rollover.diagnosis.selection.pairs import best_subsets, with_first_replaced
-from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.simplification import followed, with_mirror_rivals
-from rollover.diagnosis.selection.stepwise import forward_selection, with_conditions_refitted
+from rollover.diagnosis.selection.stepwise import forward_selection
 from rollover.diagnosis.selection.truncated_start import loading_first
 from rollover.diagnosis.settings import SETTINGS
 
@@ -34,45 +33,6 @@ FULL_P_VALUE = SETTINGS.selection.simplification.full_p_value
 LEAST_GAIN = SETTINGS.selection.ensemble_validation.least_gain
 
 
-@dataclass(frozen=True, kw_only=True)
-class Explanation:
-    """What was selected: the base, the fit (the base itself if nothing), a step for each of its effects.
-
-    Each step's base is the fit without that effect, so that its rivals competed beside all the others. `first` is the
-    first step, taken or not; `looked` what all candidates scored beside the base; `detectable` the strength at which
-    each would have shown, beside the explanation for those that are not in it.
-    """
-
-    base: Fitted
-    fitted: Fitted
-    parts: tuple[Step, ...]
-    looked: ScoreTest
-    detectable: Mapping[str, float]
-    before: Mismatch
-    after: Mismatch
-    first: Step | None = None
-    refuted: bool = False  # whether the best candidate's gain did not outlast the scatter of its own runs
-    settled: bool = True  # whether as many effects as may be are these, and not any that can be bent to what is there
-
-    def refused(self) -> Explanation:
-        """The same with nothing held to be found."""
-        return replace(self, parts=(), fitted=self.base, after=self.before)
-
-    @property
-    def p_value(self) -> float:
-        """Of "nothing but noise": min over two tests of 1 - (1 - p)^(1/a), a their shares of all errors (Sidak).
-
-        The omnibus test's p and the best candidate's, half each; where runs scatter nearly all is the first one's: the
-        second is rarely small by chance there, as weights and neighbours lower every score. A candidate that was looked
-        at closer and refuted tells nothing.
-        """
-        if self.refuted:
-            return self.before.p_value
-        share = TUNING.look_share if any(b.expected is not None for b in self.base.blocks) else 0.5
-        tests = ((self.before.p_value, 1.0 - share), (self.looked.p_value(), share))
-        return float(min(-np.expm1(np.log1p(-min(p, TUNING.largest_p_value)) / a) for p, a in tests))
-
-
 def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     """Forward selection of up to three effects, each beyond chance, then each tried without and against its rivals.
 
@@ -80,16 +40,16 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     """
     problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
     found = loading_first(inquiry, forward_selection(inquiry, base))
-    base, taken, left, current = found.base, list(found.steps), found.left, found.fitted
-    is_whole = is_enough(problem, current, left)
+    base, taken, mismatch, current = found.base, list(found.steps), found.after, found.fitted
+    is_whole = is_enough(problem, current, mismatch)
     is_open = not (problem.effort.is_ensemble or found.paired) and (not is_whole or len(taken) == MOST_EFFECTS)
     if found.first is not None and is_open:
         # two that leave what chance leaves are preferred to three that do
         both = best_subsets(inquiry, taken or [found.first], found.at_first, current, is_whole=is_whole)
         if both is not None:
-            (taken, left), current = both, both[0][-1].fitted
-            is_whole = is_enough(problem, current, left)
-    is_open = is_whole and len(taken) > 1 and may_be_named(problem, current, left)
+            (taken, mismatch), current = both, both[0][-1].fitted
+            is_whole = is_enough(problem, current, mismatch)
+    is_open = is_whole and len(taken) > 1 and may_be_named(problem, current, mismatch)
     retained = _fully_fitted_steps(inquiry, taken) if is_open else _one_each(inquiry, taken)
     parts = [s.again(problem) for s in taken] if retained is None else retained
     if is_open and retained is not None and not problem.effort.is_ensemble:
@@ -101,30 +61,30 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         base=base,
         fitted=current,
         parts=tuple(parts),
-        looked=found.at_first,
-        detectable={**found.at_first.detectable, **found.looked.detectable},
+        scored=found.at_first,
+        detectable={**found.at_first.detectable, **found.scored.detectable},
         before=found.before,
         after=mismatch_of(problem.dataset, current.blocks, phases),
         first=None
         if found.first is None
         else found.first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map),
         refuted=found.refuted,
-        settled=retained is not None,
+        is_unique=retained is not None,
     )
 
 
-def may_be_named(problem: Problem, fitted: Fitted, left: Mismatch) -> bool:
+def may_be_named(problem: Problem, fitted: Fitted, mismatch: Mismatch) -> bool:
     """Whether several effects may be named: all together leave no more than `verdict_on` asks, or one is needless."""
-    if problem.effort.is_ensemble or len(fitted.effects) < MOST_EFFECTS or left.p_value > FULL_P_VALUE:
+    if problem.effort.is_ensemble or len(fitted.effects) < MOST_EFFECTS or mismatch.p_value > FULL_P_VALUE:
         return True
-    if not matters(problem, fitted, left) or is_tolerated(problem, fitted):
+    if not matters(problem, fitted, mismatch) or is_tolerated(problem, fitted):
         return True
     return len(backward_elimination(problem, problem.again(fitted)).effects) < MOST_EFFECTS
 
 
 def _fully_fitted_steps(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
-    """Steps of the effects that are needed, as `_needed_steps`, the last one's fit followed to its end."""
-    retained = _needed_steps(inquiry, taken)
+    """Steps of the effects that are needed, as `_retained_steps`, the last one's fit followed to its end."""
+    retained = _retained_steps(inquiry, taken)
     return None if retained is None else _one_each(inquiry, [*retained[:-1], followed(inquiry, retained[-1])[0]])
 
 
@@ -151,7 +111,7 @@ def _one_each(inquiry: Inquiry, steps: Sequence[Step]) -> list[Step]:
     return [*found, known[last.key]]
 
 
-def _needed_steps(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
+def _retained_steps(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
 
     Beside a better one others may not be needed any more. Returned in such an order that the last one's fit is the
@@ -198,12 +158,12 @@ def backward_elimination(problem: Problem, fitted: Fitted, base: Fitted | None =
     """
     while len(fitted.effects) > 1:
         losses: list[tuple[float, int, Fitted | None]] = [(np.inf, -1, None)]
-        surely = significant_by_wald(problem, fitted) if problem.effort.is_ensemble else set()
-        for k in {*range(fitted.first, len(fitted.candidates))} - surely:
+        significant = significant_by_wald(problem, fitted) if problem.effort.is_ensemble else set()
+        for k in {*range(fitted.first, len(fitted.candidates))} - significant:
             rest = _without_kth(problem, fitted, k, base)
-            losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
+            losses.append((rest.chi2 - fitted.chi2 if rest is not None else np.inf, k, rest))
         loss, _, rest = min(losses, key=lambda one: one[0])
-        dispersion = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
+        dispersion = max(1.0, fitted.chi2 / sum(b.residual.size for b in fitted.blocks))
         if rest is None or loss / dispersion > LEAST_GAIN:
             break
         fitted = problem.again(rest) if problem.effort.is_ensemble else rest
@@ -229,7 +189,7 @@ def verdict_on(problem: Problem, found: Explanation, groups: Groups, phases: Pha
     where it takes nearly all.
     """
     held, is_curved = found.fitted.effects, is_a_curve(problem, found.fitted)
-    if not found.settled or is_over_flexible(held) or (is_curved and is_straight_line(held)):
+    if not found.is_unique or is_over_flexible(held) or (is_curved and is_straight_line(held)):
         return found.refused(), "unexplained"
     is_bending = len(found.parts) == MOST_EFFECTS or is_one_sensor(held) or is_flexible_soil(held)
     is_whole = found.after.p_value > (FULL_P_VALUE if is_bending else P_VALUE)
@@ -280,7 +240,7 @@ def redundant_effects(problem: Problem, found: Explanation, ids: Collection[str]
     if problem.effort.is_ensemble:
         return set(ids)
     fitted, done = found.fitted, set()
-    dispersion = problem.samples_per_error * max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
+    dispersion = problem.samples_per_error * max(1.0, fitted.chi2 / sum(b.residual.size for b in fitted.blocks))
     shifts = [b.shift for b in fitted.blocks]
     for k, c in enumerate(fitted.candidates):
         if c.id not in ids:
@@ -288,48 +248,25 @@ def redundant_effects(problem: Problem, found: Explanation, ids: Collection[str]
         others = [(o, fitted.x[own]) for j, (o, own) in enumerate(with_slices(fitted.candidates)) if j != k]
         fits = [without_effect(problem, fitted, k)]
         for j, (other, x) in enumerate(others):
-            for place in other.with_secondary(x) if other.shapes else ():
-                way = [*others[:j], (other.whole(), place), *others[j + 1 :]]
+            for point in other.with_secondary(x) if other.secondary else ():
+                way = [*others[:j], (other.whole(), point), *others[j + 1 :]]
                 fits.append(problem.fit([o for o, _ in way], [v for _, at in way for v in at], shifts=shifts))
-        if min((f.left for f in fits if f is not None), default=np.inf) - fitted.left < LEAST_GAIN * dispersion:
+        if min((f.chi2 for f in fits if f is not None), default=np.inf) - fitted.chi2 < LEAST_GAIN * dispersion:
             done.add(c.id)
     return done
 
 
-def by_first_effect(problem: Problem, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:
-    """The explanation by its first effect alone, where that is none of those that may be `nothing`; else refused.
+def by_first_effect(problem: Problem, found: Explanation, refuted: Collection[str], phases: Phases) -> Explanation:
+    """The explanation by its first effect alone, where that is none of those that may be `refuted`; else refused.
 
     Of one that was all there is, its gain is refuted with it.
     """
     one = found.first
-    if one is None or one.fitted.candidates[-1].id in nothing:
+    if one is None or one.fitted.candidates[-1].id in refuted:
         return replace(found.refused(), refuted=found.refuted or len(found.parts) == 1)
     one = one.again(problem)
     one, after = with_conditions_refitted(problem, one, mismatch_of(problem.dataset, one.fitted.blocks, phases), phases)
     return replace(found, parts=(one,), fitted=one.fitted, after=after)
-
-
-def kind_of(c: Candidate) -> Verdict:
-    """The verdict on what an effect explains."""
-    return "missing-physics" if c.kind == "physics" else "parameter" if c.kind == "parameter" else "sensor"
-
-
-def strongest(problem: Problem, base: Fitted, fitted: Fitted) -> Candidate:
-    """The effect without which most would be left; of full runs, where fits are dear, with the others as they stand."""
-    best, loss = fitted.effects[0], -np.inf
-    for k, c in enumerate(fitted.effects, fitted.first):
-        if len(fitted.effects) == 1:
-            return c
-        if problem.effort.is_ensemble:
-            others, columns = all_but_one(fitted, k)
-            left = left_at(problem, others, [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks])
-        else:
-            rest = without_effect(problem, fitted, k, rounds=4)
-            left = rest.left if rest is not None else None
-        left = base.left if left is None else left
-        if left > loss:
-            best, loss = c, left
-    return best
 
 
 def is_negligible_effect(problem: Problem, first: Step | None, phases: Phases) -> bool:

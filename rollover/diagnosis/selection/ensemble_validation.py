@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.ensemble_mean import ensemble_mean_misfit, refined_under_scatter
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.cross_validation import Groups, held_out
+from rollover.diagnosis.fit.ensemble_mean import ensemble_mean_misfit, fitted_to_ensemble_mean
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate, physical, same_family
-from rollover.diagnosis.fit.step import Groups, Step
+from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.noise.ensemble import has_diverged, p_value_of_divergence
 from rollover.diagnosis.result import Interval
@@ -35,17 +36,6 @@ def restarted_base(problem: Problem, base: Fitted) -> Fitted:
     return min((f for f in (base, again) if f is not None), key=lambda f: sum(b.total for b in f.blocks))
 
 
-def with_shifts_near_prior(problem: Problem, base: Fitted) -> Fitted:
-    """A base with its time shifts no further from where known clocks say than their error."""
-    blocks = []
-    for r, b in enumerate(base.blocks):
-        known = problem.dataset[r].recording.clock.zero != "unknown"
-        there = min(max(b.shift, -b.prior), b.prior) if known else b.shift
-        new = problem.block(r, base.candidates, base.x, there, problem.effort.fine) if there != b.shift else b
-        blocks.append(new or b)
-    return replace(base, blocks=tuple(blocks))
-
-
 def with_full_weights(problem: Problem, fitted: Fitted) -> Fitted:
     """A fit with all samples counted in full if more recordings took another course than chance sends there.
 
@@ -55,7 +45,7 @@ def with_full_weights(problem: Problem, fitted: Fitted) -> Fitted:
     found = problem.again(fitted)
     if (
         p_value_of_divergence(sum(has_diverged(b.heavy_tail) for b in found.blocks), len(found.blocks))
-        > SETTINGS.noise.ensemble.other_course_p_value
+        > SETTINGS.noise.ensemble.divergence_p_value
     ):
         return found
     problem.heavy_tailed = False
@@ -72,17 +62,17 @@ def counted_in_full(problem: Problem, base: Fitted) -> Fitted:
     return found
 
 
-def without_unsupported_rivals(found: Step, looked: ScoreTest, spoken: float = TUNING.own_p_value) -> Step:
+def without_unsupported_rivals(found: Step, scored: ScoreTest, spoken: float = TUNING.own_p_value) -> Step:
     """A step without rivals that nothing spoke for when looked at, by a p-value: their runs met them by chance.
 
     What speaks for one that acts somewhere speaks for its family; for a strong one its runs did.
     """
     last = [f.candidates[-1] for f in found.rivals]
     spoken_for = [
-        c for c in last if c.key in looked.far or p_value(looked.scores.get(c.key, 0.0), looked.null) < spoken
+        c for c in last if c.key in scored.far or p_value(scored.scores.get(c.key, 0.0), scored.null) < spoken
     ]
-    kept = [*spoken_for, *same_family(last, spoken_for)]
-    return replace(found, rivals=tuple(f for f in found.rivals if f.candidates[-1] in kept))
+    retained = [*spoken_for, *same_family(last, spoken_for)]
+    return replace(found, rivals=tuple(f for f in found.rivals if f.candidates[-1] in retained))
 
 
 def ensemble_validated(problem: Problem, found: Step, groups: Groups) -> Step | None:
@@ -112,7 +102,7 @@ def ensemble_validated(problem: Problem, found: Step, groups: Groups) -> Step | 
 
 
 def judged_before_impact(problem: Problem, found: Step) -> Step:
-    """A step judged by samples alone that no course a run may take has touched."""
+    """A step by its gain on samples before any run diverges."""
 
     def cut(f: Fitted) -> Fitted:
         blocks = [
@@ -154,7 +144,7 @@ def is_there(problem: Problem, fitted: Fitted) -> bool:
 def significant_by_wald(problem: Problem, fitted: Fitted) -> set[int]:
     """Places of the effects that no run is needed to tell that something would be missing without: by slopes alone."""
     each = zip(map(_nulls, fitted.candidates), intervals(problem, fitted, {}), strict=True)
-    return {k for k, (nulls, by_slopes) in enumerate(each) if _is_apart(by_slopes, nulls, TUNING.needed_width)}
+    return {k for k, (nulls, by_slopes) in enumerate(each) if _is_apart(by_slopes, nulls, TUNING.retained_width)}
 
 
 def _nulls(c: Candidate) -> dict[str, float]:
@@ -188,4 +178,12 @@ def is_shared(found: Step, groups: Groups) -> bool:
 def _gains(found: Step, groups: Groups) -> Array:
     """What each recording gains (k,) where it is held out, over what is left per sample."""
     with_, without_ = held_out(found.fitted, groups), held_out(found.base, groups)
-    return np.asarray((without_.left - with_.left) / max(1.0, float(with_.left.sum() / with_.count.sum())))
+    return np.asarray((without_.chi2 - with_.chi2) / max(1.0, float(with_.chi2.sum() / with_.count.sum())))
+
+
+def refined_under_scatter(problem: Problem, step: Step) -> Step:
+    """A step moved to where its fit meets the mean of its own runs best (D8), beside a base under that scatter.
+
+    Its rivals are not put under it: that costs runs, see `Step.again`.
+    """
+    return replace(step.moved_to(fitted_to_ensemble_mean(problem, step.fitted)), base=problem.again(step.base))

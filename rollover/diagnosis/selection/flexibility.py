@@ -7,20 +7,20 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import without_shift_direction
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-LINES = ("sensor-gain", "sensor-scale", "sensor-bias")
+STRAIGHT = ("sensor-gain", "sensor-scale", "sensor-bias")
 BACK = ("soil-elastic-rebound", "soil-adhesion")  # effects of the soil that act on the way back alone
 TUNING = SETTINGS.selection.flexibility
 
 
 def is_a_curve(problem: Problem, fitted: Fitted) -> bool:
     """Whether effects that make a straight line of a channel leave a curve of it, or one that drifts."""
-    channels = {str(c.channel) for c in fitted.candidates if c.id in LINES}
+    channels = {str(c.channel) for c in fitted.candidates if c.id in STRAIGHT}
     return any(
         curvature_gain(problem, fitted, channel, term) > TUNING.curve_gain
         for channel in sorted(channels)
@@ -30,7 +30,7 @@ def is_a_curve(problem: Problem, fitted: Fitted) -> bool:
 
 def is_straight_line(candidates: Sequence[Candidate]) -> bool:
     """Whether all of several effects make a straight line of one channel."""
-    return len({c.channel for c in candidates}) == 1 and all(c.id in LINES for c in candidates)
+    return len({c.channel for c in candidates}) == 1 and all(c.id in STRAIGHT for c in candidates)
 
 
 def square(read: Array, time: Array) -> Array:

@@ -8,20 +8,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.cross_validation import cross_validated_by_refits, held_out, held_out_disadvantage
-from rollover.diagnosis.fit.jobs import Task
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.linearisation import at_an_end
+from rollover.diagnosis.data.phases import Phases
+from rollover.diagnosis.fit.cross_validation import Groups, cross_validated_by_refits, held_out, held_out_disadvantage
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, is_at_bound
 from rollover.diagnosis.fit.local_search import completed_shifts
-from rollover.diagnosis.fit.step import Groups, Phases, Screened, Step
+from rollover.diagnosis.fit.step import Inquiry, Screened, Step
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.restarts import (
     best_of_each,
     continued_from,
     from_other_starts,
-    with_shapes,
+    with_secondary_parameters,
     with_time_shifts,
 )
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value
@@ -40,10 +40,10 @@ Array = NDArray[np.float64]
 TUNING = SETTINGS.selection.forward_step
 
 
-def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
+def step(inquiry: Inquiry, base: Fitted, scored: ScoreTest) -> Step | None:
     """Fit the promising candidates beside the base and rank them by what they predict of held-out conditions.
 
-    `looked` is what all of them scored beside the base. Where the best leaves nearly noise, that noise is weighed by
+    `scored` is what all of them scored beside the base. Where the best leaves nearly noise, that noise is weighed by
     what it leaves; the step is then under that noise. None if nothing could be fitted.
     """
     problem, groups, candidates = inquiry.problem, inquiry.groups, inquiry.free(base)
@@ -56,9 +56,9 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
     )
     who, start = problem.beginning(base)
     early = replace(inquiry, problem=who)
-    screened = screen(early, start, promising(candidates, looked, problem.effort), few, shifts, looked)
+    screened = screen(early, start, promising(candidates, scored, problem.effort), few, shifts, scored)
     count = sum(b.residual.size for b in base.blocks)
-    screened, begun_with = _first_fits(early, start, screened, few, shifts, looked)
+    screened, begun_with = _first_fits(early, start, screened, few, shifts, scored)
     reused = reusable_slopes(problem, base)
     tasks = [
         Task(candidates=f.candidates, start=f.x, shifts=completed_shifts(shifts, f, few), width=1, reused=reused)
@@ -68,45 +68,49 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
     if not fits:
         return None
     if base.candidates and not problem.effort.is_ensemble:
-        fits += _restarted_from_base(inquiry, base, fits, looked)
-    fits.sort(key=lambda f: f.left)
+        fits += _restarted_from_base(inquiry, base, fits, scored)
+    fits.sort(key=lambda f: f.chi2)
     if not problem.effort.is_ensemble:
-        fits = from_other_starts(inquiry, base, fits, looked, shifts)
+        fits = from_other_starts(inquiry, base, fits, scored, shifts)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
-    able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < TUNING.polished_misfit * fits[0].left]
+    able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.chi2 < TUNING.polished_misfit * fits[0].chi2]
     alone = [f for f in able[:1] if f is fits[0] and not base.effects]
     near = (
         able[: problem.effort.polishes]
-        if fits[0].left > SETTINGS.fit.levenberg_marquardt.noise_left**2 * count
+        if fits[0].chi2 > SETTINGS.fit.levenberg_marquardt.noise_left**2 * count
         else alone
     )
     if near and problem.effort.polishes:
         polished = inquiry.fits([continued_from(f, "polish") for f in near])
         others = [f for f in fits if not any(f is one for one in near)]
         fits = others + [new or old for new, old in zip(polished, near, strict=True)]
-    fits = best_of_each(fits) if problem.effort.is_ensemble else with_shapes(inquiry, base, best_of_each(fits))
+    fits = (
+        best_of_each(fits)
+        if problem.effort.is_ensemble
+        else with_secondary_parameters(inquiry, base, best_of_each(fits))
+    )
     if not problem.effort.is_ensemble:
         fits = with_time_shifts(inquiry, base, fits)
     if with_noise_of_fit(problem, fits[0], inquiry.phases):
         base, fits = problem.again(base), [problem.again(f) for f in fits]
     if not problem.effort.is_ensemble:
         fits = _refitted_where_slopes_mislead(inquiry, fits)
-    fits.sort(key=lambda f: held_out(f, groups).left.sum())
+    fits.sort(key=lambda f: held_out(f, groups).chi2.sum())
     fits = simplest(fits, groups, problem.samples_per_error)
-    p = by_chance(base, fits, looked, problem.samples_per_error)
+    p = by_chance(base, fits, scored, problem.samples_per_error)
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
 
 
-def by_chance(base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shared: float) -> float:
+def by_chance(base: Fitted, fits: Sequence[Fitted], scored: ScoreTest, shared: float) -> float:
     """p-value of what the best of all fits gains, where `shared` samples have one error."""
-    least = min(f.left for f in fits)
+    least = min(f.chi2 for f in fits)
     # what even the best leaves is no chance of the noise's size
     dispersion = max(1.0, least / sum(b.residual.size for b in base.blocks))
-    score = looked.score
+    score = scored.score
     if shared > 1.0:
         # beside a tolerance what is missing is large, and a fit finds more of it than its slope where it is not
-        dispersion, score = dispersion * shared, max(score, base.left - least)
-    return p_value(score / dispersion, looked.null)
+        dispersion, score = dispersion * shared, max(score, base.chi2 - least)
+    return p_value(score / dispersion, scored.null)
 
 
 def reusable_slopes(problem: Problem, base: Fitted, few: Sequence[int] | None = None) -> tuple[Array, ...] | None:
@@ -119,7 +123,7 @@ def reusable_slopes(problem: Problem, base: Fitted, few: Sequence[int] | None = 
 def _refitted_where_slopes_mislead(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits, with what the one that leaves least foretells by fits, where by its slopes another foretells better."""
     groups = inquiry.groups
-    lead, ahead = min(fits, key=lambda f: f.left), min(fits, key=lambda f: held_out(f, groups).left.sum())
+    lead, ahead = min(fits, key=lambda f: f.chi2), min(fits, key=lambda f: held_out(f, groups).chi2.sum())
     if lead is ahead:
         return list(fits)
     new = cross_validated_by_refits(
@@ -128,32 +132,32 @@ def _refitted_where_slopes_mislead(inquiry: Inquiry, fits: Sequence[Fitted]) -> 
     return [new if f is lead else f for f in fits]
 
 
-def _restarted_from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest) -> list[Fitted]:
+def _restarted_from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], scored: ScoreTest) -> list[Fitted]:
     """Fits anew, from the base itself, of candidates that were led astray: beside them more is left than without.
 
     Those that soon gain a part of what the best does are gone on with.
     """
-    tasks, least, shifts = [], min(f.left for f in fits), tuple(b.shift for b in base.blocks)
+    tasks, least, shifts = [], min(f.chi2 for f in fits), tuple(b.shift for b in base.blocks)
     for f in fits:
-        if f.left > base.left:
-            begin = looked.starts.get(f.candidates[-1].key, (f.own,))[0]
+        if f.chi2 > base.chi2:
+            begin = scored.starts.get(f.candidates[-1].key, (f.own,))[0]
             tasks.append(
                 Task(candidates=f.candidates, start=(*base.x, *begin), shifts=shifts, rounds=TUNING.short_rounds)
             )
     short = [f for f in inquiry.fits(tasks) if f is not None]
-    able = [f for f in short if base.left - f.total > TUNING.short_share * (base.left - least)]
+    able = [f for f in short if base.chi2 - f.total > TUNING.short_share * (base.chi2 - least)]
     ended = [f for f in inquiry.fits([continued_from(f, "fit") for f in able]) if f is not None]
     return ended + [inquiry.problem.again(f) for f in short if not any(f is one for one in able)]
 
 
 def with_noise_of_fit(problem: Problem, fitted: Fitted, phases: Phases) -> bool:
     """Weigh the recordings by all that a fit leaves, if that is noise: as little as seen, or more without structure."""
-    left, count = fitted.left, sum(b.residual.size for b in fitted.blocks)
-    if left > TUNING.like_noise**2 * count:
+    chi2, count = fitted.chi2, sum(b.residual.size for b in fitted.blocks)
+    if chi2 > TUNING.like_noise**2 * count:
         return False
     before = problem.dataset
     problem.with_noise_model(autoregression.with_noise_of_residuals(before, problem.residuals(fitted)))
-    if left < TUNING.nearly_noise**2 * count:
+    if chi2 < TUNING.nearly_noise**2 * count:
         return True
     if (
         mismatch_of(problem.dataset, problem.again(fitted).blocks, phases).p_value
@@ -170,11 +174,11 @@ def _first_fits(
     screened: Sequence[Screened],
     few: Sequence[int],
     shifts: Sequence[float],
-    looked: ScoreTest,
+    scored: ScoreTest,
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
     problem = inquiry.problem
-    chosen = {s.candidate.key: s for s in _chosen(screened, problem.effort, looked)}
+    chosen = {s.candidate.key: s for s in _chosen(screened, problem.effort, scored)}
     nrmse_by_key: dict[str, float] = {}
     inquiry.say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
@@ -188,15 +192,15 @@ def _first_fits(
         for start in s.starts
         for x in (base.x, *_elsewhere_of(base))
     ]  # fmt: skip
-    far = [] if problem.heavy_tailed else [task for task in tasks if task.candidates[-1].key in looked.far]
+    far = [] if problem.heavy_tailed else [task for task in tasks if task.candidates[-1].key in scored.far]
     fits = [f for f in inquiry.fits([task for task in tasks if task not in far]) if f is not None]
     fits += _robust_short_fits(inquiry, far, few)
     for one in fits:
         key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
-        nrmse_by_key[key] = min(nrmse_by_key.get(key, np.inf), float(np.sqrt(one.left / size)))
-    fits.sort(key=lambda f: f.left)
+        nrmse_by_key[key] = min(nrmse_by_key.get(key, np.inf), float(np.sqrt(one.chi2 / size)))
+    fits.sort(key=lambda f: f.chi2)
     worth = [
-        f for k, f in enumerate(fits) if k < problem.effort.leaders or f.left < TUNING.followed_misfit * fits[0].left
+        f for k, f in enumerate(fits) if k < problem.effort.leaders or f.chi2 < TUNING.followed_misfit * fits[0].chi2
     ]
     if problem.effort.is_ensemble and fits:
         worth = best_of_each(worth) + _other_minimum(worth)
@@ -206,13 +210,13 @@ def _first_fits(
         worth = [
             f
             for f in worth
-            if as_it_is - f.left >= TUNING.rival_share * (as_it_is - fits[0].left)
-            or f.candidates[-1].key == looked.best
+            if as_it_is - f.chi2 >= TUNING.rival_share * (as_it_is - fits[0].chi2)
+            or f.candidates[-1].key == scored.best
         ]
     worth = worth[: problem.effort.most_leaders]
     # a first fit may lead astray what scored most
-    if all(f.candidates[-1].key != looked.best for f in worth):
-        worth += [f for f in fits if f.candidates[-1].key == looked.best][:1]
+    if all(f.candidates[-1].key != scored.best for f in worth):
+        worth += [f for f in fits if f.candidates[-1].key == scored.best][:1]
     return [replace(s, nrmse=nrmse_by_key.get(s.candidate.key, 0.0)) for s in screened], worth
 
 
@@ -222,7 +226,7 @@ def _elsewhere_of(base: Fitted) -> list[tuple[float, ...]]:
     Fitted alone it was bent to what is missing, and from there no way may lead back.
     """
     held, effects = (sum(len(c.search) for c in part) for part in (base.candidates[: base.first], base.effects))
-    return [(*at, *base.x[len(base.x) - effects :]) for c in base.candidates[: base.first] for at in c.places if held]
+    return [(*at, *base.x[len(base.x) - effects :]) for c in base.candidates[: base.first] for at in c.points if held]
 
 
 def _robust_short_fits(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[int]) -> list[Fitted]:
@@ -240,31 +244,31 @@ def _robust_short_fits(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[in
     return [f for f in found if len(f.blocks) == len(few)]
 
 
-def _chosen(screened: Sequence[Screened], effort: Effort, looked: ScoreTest) -> list[Screened]:
+def _chosen(screened: Sequence[Screened], effort: Effort, scored: ScoreTest) -> list[Screened]:
     """Those worth a first fit: that start well, and that have most to gain.
 
     Of runs that scatter those whose score is a small part of the best one's are not; what a sensor makes of them costs
     none: as many more. A part that gives way looks like several sensors at the end of their ranges, and scores less
     than each: the two are compared with their own kind. With a leader comes its family.
     """
-    by_start = sorted(screened, key=lambda s: s.left)[: effort.promising // 2]
+    by_start = sorted(screened, key=lambda s: s.chi2)[: effort.promising // 2]
     if not effort.is_ensemble:
         return [*by_start, *sorted(screened, key=lambda s: -s.potential)[: effort.promising]]
     by_key = {s.candidate.key: s for s in screened}
-    ranked = [by_key[c.key] for c in looked.ranked([s.candidate for s in screened])]
+    ranked = [by_key[c.key] for c in scored.ranked([s.candidate for s in screened])]
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
     reading = [s for s in ranked if s.candidate.kind == "sensor"]
     related = of_same_family([s.candidate for s in moving], effort.promising, effort.leaders)
 
     def score(s: Screened) -> float:
-        return looked.scores.get(s.candidate.key, 0.0)
+        return scored.scores.get(s.candidate.key, 0.0)
 
     able = []
     for own in (moving, reading):
         least = TUNING.least_score * max(map(score, own), default=0.0)
         begun_well = [s for s in by_start if s in own]
         able += [
-            s for s in (*begun_well, *own[: effort.promising]) if score(s) >= least or s.candidate.key in looked.leading
+            s for s in (*begun_well, *own[: effort.promising]) if score(s) >= least or s.candidate.key in scored.leading
         ]
     return [*able, *(s for s in moving if s.candidate in related)]
 
@@ -317,20 +321,20 @@ def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitt
     Hardly worse: within a standard error, or within what jumps make the misfit rough by. Of those that are one and the
     same to these recordings the one leads that asks for the more usual strength. `shared` samples have one error.
     """
-    least = held_out(fits[0], groups).left.sum()
+    least = held_out(fits[0], groups).chi2.sum()
     near = [
         f
         for f in fits
         if held_out_disadvantage(f, fits[0], groups, shared)[0] < TUNING.simpler_errors
-        or held_out(f, groups).left.sum() < (1.0 + TUNING.roughness) * least
+        or held_out(f, groups).chi2.sum() < (1.0 + TUNING.arithmetic_share) * least
     ]
     first = min(near, key=lambda f: len(f.x))
-    twins = [f for f in near if len(f.x) == len(first.x) and abs(f.left - first.left) < TUNING.same_misfit]
+    twins = [f for f in near if len(f.x) == len(first.x) and abs(f.chi2 - first.chi2) < TUNING.same_misfit]
     first = min(twins, key=lambda f: f.candidates[-1].strength(f.own))
     return [first, *(f for f in fits if f is not first)]
 
 
-def confusion(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
+def confusion_set(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
     """Rivals that predict held-out recordings as well as the best does, the best first.
 
     And those of no more numbers that meet all recordings as well as it does: what hangs on a single one is hard to
@@ -340,18 +344,13 @@ def confusion(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
     best, base = step_.fitted, step_.base
     found = [best]
     for rival in step_.rivals:
-        explains = base.left - rival.left > 0.5 * (base.left - best.left)
-        as_well = len(rival.x) <= len(best.x) and rival.left < best.left + TUNING.excluded_errors**2
+        explains = base.chi2 - rival.chi2 > 0.5 * (base.chi2 - best.chi2)
+        as_well = len(rival.x) <= len(best.x) and rival.chi2 < best.chi2 + TUNING.excluded_errors**2
         becomes_best = (
-            len(rival.x) > len(best.x) and rival.left > best.left - TUNING.excluded_errors**2 and ends_at_bound(rival)
+            len(rival.x) > len(best.x) and rival.chi2 > best.chi2 - TUNING.excluded_errors**2 and is_at_bound(rival)
         )
         if rival is best or becomes_best or not explains:
             continue
         if as_well or min(held_out_disadvantage(rival, best, groups, shared)) < TUNING.excluded_errors:
             found.append(rival)
     return found
-
-
-def ends_at_bound(fitted: Fitted) -> bool:
-    """Whether a number of the last effect stands at an end of its range."""
-    return any(at_an_end(v) for v in fitted.own)

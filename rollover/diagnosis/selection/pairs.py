@@ -8,20 +8,18 @@ from dataclasses import replace
 from functools import partial
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.jobs import Task
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import first_effect_last
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, first_effect_last
 from rollover.diagnosis.fit.local_search import completed_shifts, representative_recordings, without_effect
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.fit.step import Inquiry, Step
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.fit.threshold_scan import has_threshold, threshold_ranges, threshold_starts
-from rollover.diagnosis.inference.adequacy import is_enough
-from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
-from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.inference.lack_of_fit import Mismatch, is_enough, mismatch_of
 from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.forward_step import step, with_noise_of_fit
-from rollover.diagnosis.selection.restarts import continued_from, with_shapes
-from rollover.diagnosis.selection.scan import look
+from rollover.diagnosis.selection.restarts import continued_from, with_secondary_parameters
+from rollover.diagnosis.selection.scan import score_candidates
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far
 from rollover.diagnosis.selection.simplification import followed, in_usual_shape, mirror_images, simpler
@@ -34,7 +32,7 @@ Start = tuple[tuple[Candidate, ...], tuple[float, ...]]  # two effects beside a 
 
 
 def best_subsets(
-    inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest, current: Fitted, *, is_whole: bool = False
+    inquiry: Inquiry, taken: Sequence[Step], scored: ScoreTest, current: Fitted, *, is_whole: bool = False
 ) -> tuple[list[Step], Mismatch] | None:
     """The best pair of effects, as steps, and what it leaves, see `best_pair`; None if `current` stays.
 
@@ -43,11 +41,11 @@ def best_subsets(
     under the noise that all of it tells of.
     """
     problem, held = inquiry.problem, inquiry.problem.dataset
-    pair = best_pair(inquiry, taken, looked)
+    pair = best_pair(inquiry, taken, scored)
     if pair is None:
         return None
-    found, left = followed(inquiry, pair)
-    if not is_enough(problem, found.fitted, left) and any(c.is_oscillatory for c in found.fitted.candidates):
+    found, mismatch = followed(inquiry, pair)
+    if not is_enough(problem, found.fitted, mismatch) and any(c.is_oscillatory for c in found.fitted.candidates):
         # what its shape shows now did not show beside another one
         ringing = (
             found.fitted
@@ -55,40 +53,42 @@ def best_subsets(
             else problem.again(first_effect_last(found.fitted))
         )
         other = with_first_replaced(inquiry, ringing)
-        if other is not None and other.fitted.left < found.fitted.left:
-            found, left = followed(inquiry, other)
+        if other is not None and other.fitted.chi2 < found.fitted.chi2:
+            found, mismatch = followed(inquiry, other)
     if is_whole and costs(problem, found.fitted, current) > SETTINGS.selection.ensemble_validation.least_gain:
         return None  # noise that such a pair tells of would hold the third effect
-    if not is_enough(problem, found.fitted, left) and with_noise_of_fit(problem, found.fitted, inquiry.phases):
+    if not is_enough(problem, found.fitted, mismatch) and with_noise_of_fit(problem, found.fitted, inquiry.phases):
         found = found.again(problem)
-        left = mismatch_of(problem.dataset, found.fitted.blocks, inquiry.phases)
+        mismatch = mismatch_of(problem.dataset, found.fitted.blocks, inquiry.phases)
     if not (
-        left.p_value > SETTINGS.inference.lack_of_fit.p_value if is_whole else is_better(found.fitted, left, current)
+        mismatch.p_value > SETTINGS.inference.lack_of_fit.p_value
+        if is_whole
+        else is_better(found.fitted, mismatch, current)
     ):
         problem.with_noise_model(held)
         return None
-    return [replace(taken[0], fitted=found.base), found], left
+    return [replace(taken[0], fitted=found.base), found], mismatch
 
 
 def costs(problem: Problem, fewer: Fitted, more: Fitted) -> float:
     """What a fit of fewer effects leaves more than one of more, over what that leaves per sample."""
-    left = problem.again(more).left
-    return (fewer.left - left) / max(1.0, left / sum(b.residual.size for b in more.blocks))
+    chi2 = problem.again(more).chi2
+    return (fewer.chi2 - chi2) / max(1.0, chi2 / sum(b.residual.size for b in more.blocks))
 
 
-def is_better(other: Fitted, left: Mismatch, current: Fitted, *, scattered: bool = False) -> bool:
+def is_better(other: Fitted, mismatch: Mismatch, current: Fitted, *, scattered: bool = False) -> bool:
     """Whether an explanation is to be taken instead of another: it leaves far less, or less and no more than chance.
 
     Far less of what is beyond the noise, or of all where runs are `scattered`, so that nobody knows what chance leaves.
     Instead of any curve, which will be refused, as much more will do.
     """
-    if left.p_value > SETTINGS.inference.lack_of_fit.p_value:
-        return other.left < current.left
+    if mismatch.p_value > SETTINGS.inference.lack_of_fit.p_value:
+        return other.chi2 < current.chi2
     if scattered:
-        return other.left < TUNING.better_share * current.left
+        return other.chi2 < TUNING.better_share * current.chi2
     chance = sum(b.residual.size for b in other.blocks)
     part = 1.0 / TUNING.better_share if is_over_flexible(current.effects) else TUNING.better_share
-    return other.left - chance < part * (current.left - chance)
+    return other.chi2 - chance < part * (current.chi2 - chance)
 
 
 def with_first_exchanged(
@@ -96,10 +96,10 @@ def with_first_exchanged(
 ) -> tuple[list[Step], Mismatch] | None:
     """Two steps with the first effect given for another beside the second, and what they leave; None if not better."""
     other = with_first_replaced(inquiry, taken[-1].fitted)
-    if other is None or other.fitted.left >= taken[-1].fitted.left:
+    if other is None or other.fitted.chi2 >= taken[-1].fitted.chi2:
         return None
-    found, left = followed(inquiry, other)
-    return ([taken[-1], found], left) if is_better(found.fitted, left, current, scattered=True) else None
+    found, mismatch = followed(inquiry, other)
+    return ([taken[-1], found], mismatch) if is_better(found.fitted, mismatch, current, scattered=True) else None
 
 
 def with_first_replaced(inquiry: Inquiry, current: Fitted) -> Step | None:
@@ -108,38 +108,40 @@ def with_first_replaced(inquiry: Inquiry, current: Fitted) -> Step | None:
     rest = without_effect(problem, current, current.first)
     if rest is None:
         return None
-    looked = look(problem, rest, inquiry.free(rest), inquiry.groups, parallel_map=inquiry.executor.parallel_map)
-    found = step(inquiry, rest, looked)
+    scored = score_candidates(
+        problem, rest, inquiry.free(rest), inquiry.groups, parallel_map=inquiry.executor.parallel_map
+    )
+    found = step(inquiry, rest, scored)
     held = problem.again(first_effect_last(current))
     if (
-        found is None or found.fitted.left > held.left + SETTINGS.selection.ensemble_validation.least_gain
+        found is None or found.fitted.chi2 > held.chi2 + SETTINGS.selection.ensemble_validation.least_gain
     ):  # on the way back nothing came as far
         rivals = () if found is None else found.rivals
         beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
-        back = Step(base=problem.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
+        back = Step(base=problem.again(rest), fitted=held, p_value=scored.p_value(), rivals=(held, *beside))
         return simpler(inquiry, back) or back
     return found
 
 
-def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Step | None:
+def best_pair(inquiry: Inquiry, taken: Sequence[Step], scored: ScoreTest) -> Step | None:
     """The best pair of the first step's rivals, of what led later, and of what gains most, as a step of its second.
 
     Of two effects neither need come first alone: a third may be like both, and the second may leave much alone. Short
     fits tell which pairs are worth whole ones; the best takes the shapes that pay if it comes near what others leave.
     """
     problem, first = inquiry.problem, taken[0]
-    lead = min(first.rivals, key=lambda f: f.left)
+    lead = min(first.rivals, key=lambda f: f.chi2)
     few, shifts = representative_recordings(lead), tuple(b.shift for b in lead.blocks)
     at, fixed_shifts = tuple(shifts[r] for r in few), is_far(problem, first.base)
     # slopes tell what two do together where these are not far off
-    partners = _partners(inquiry, first, taken, looked, TUNING.scored if fixed_shifts else 0)
+    partners = _partners(inquiry, first, taken, scored, TUNING.scored if fixed_shifts else 0)
     two = itertools.combinations(partners, 2)
     base = first.base
     short: list[Start] = [((*base.candidates, a, b), (*base.x, *x, *y)) for (a, x), (b, y) in two if _may_explain(a, b)]
     short += (
         _with_thresholds_scanned(inquiry, partners, few, shifts, (base.candidates, base.x))
         if fixed_shifts
-        else _pairs_by_slopes(inquiry, base, looked)
+        else _pairs_by_slopes(inquiry, base, scored)
     )
     inquiry.say(f"{len(short)} pairs of effects")
     for rounds, most in TUNING.short_fits:
@@ -147,7 +149,7 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
             Task(candidates=both, start=x, shifts=at, only=tuple(few), rounds=rounds, fixed_shifts=fixed_shifts)
             for both, x in short
         ]
-        met = sorted((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.left)[:most]
+        met = sorted((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.chi2)[:most]
         short = [(f.candidates, f.x) for f in met]
     if not met or _explains_little(problem.again(lead), met[0], few):
         return None
@@ -155,14 +157,14 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
     fits = [f for f in inquiry.fits(tasks) if f is not None]
     if not fits:
         return None
-    best = min([*fits, *_with_secondary_fitted(inquiry, fits), *_traced(inquiry, fits)], key=lambda f: f.left)
-    best = min([best, *_mirrored(inquiry, best)], key=lambda f: f.left)
-    if best.left < SETTINGS.fit.local_search.abandon_above * taken[-1].fitted.left:
+    best = min([*fits, *_with_secondary_fitted(inquiry, fits), *_traced(inquiry, fits)], key=lambda f: f.chi2)
+    best = min([best, *_mirrored(inquiry, best)], key=lambda f: f.chi2)
+    if best.chi2 < SETTINGS.fit.local_search.abandon_above * taken[-1].fitted.chi2:
         ways = (best, problem.again(first_effect_last(best)))
         tasks = [Task(candidates=p.candidates[:-1], start=p.x[: -len(p.own)], shifts=shifts) for p in ways]
         for pair, alone in zip(ways, inquiry.fits(tasks), strict=True):
             if alone is not None:
-                best = min(best, *with_shapes(inquiry, alone, [pair]), key=lambda f: f.left)
+                best = min(best, *with_secondary_parameters(inquiry, alone, [pair]), key=lambda f: f.chi2)
     alone = problem.fit(best.candidates[:-1], best.x[: -len(best.own)], shifts=[b.shift for b in best.blocks])
     return None if alone is None else Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
 
@@ -172,10 +174,10 @@ def _may_explain(one: Candidate, other: Candidate) -> bool:
     return one.key != other.key and not is_over_flexible((one, other))
 
 
-def _pairs_by_slopes(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> list[Start]:
+def _pairs_by_slopes(inquiry: Inquiry, base: Fitted, scored: ScoreTest) -> list[Start]:
     """Pairs of candidates that gain most together by their slopes, in their usual shapes, from where these lead."""
     usual = {c.key: c for c in inquiry.candidates}
-    begun = [(usual[key], x, usual[other], y) for (key, x), (other, y) in looked.both]
+    begun = [(usual[key], x, usual[other], y) for (key, x), (other, y) in scored.both]
     return [((*base.candidates, a, b), (*base.x, *x, *y)) for a, x, b, y in begun if _may_explain(a, b)]
 
 
@@ -192,8 +194,8 @@ def _with_thresholds_scanned(
     """
     able = [c for c, _ in partners if has_threshold(c) and not c.has_secondary]
     ways = [(a, x, c) for a, x in partners[: TUNING.leading] for c in able if c.key != a.key]
-    look = partial(threshold_starts, few=tuple(few), shifts=tuple(shifts), base=base)
-    each = zip(ways, inquiry.parallel_map(look, ways), strict=True)
+    starts_of = partial(threshold_starts, few=tuple(few), shifts=tuple(shifts), base=base)
+    each = zip(ways, inquiry.parallel_map(starts_of, ways), strict=True)
     return [((*base[0], a, c), x) for (a, _, c), x in each if x is not None]
 
 
@@ -219,25 +221,25 @@ def _with_secondary_fitted(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fi
         for f in pairs
         if _is_oscillatory(f)
     ]
-    lead = min(pairs, key=lambda f: f.left)
-    near = [f for f in able if f.left < TUNING.same_misfit * lead.left and f.candidates[-1].shapes]
+    lead = min(pairs, key=lambda f: f.chi2)
+    near = [f for f in able if f.chi2 < TUNING.same_misfit * lead.chi2 and f.candidates[-1].secondary]
     leaves = tuple(b.total for b in lead.blocks)
     made = inquiry.fits([replace(continued_from(f, "shape"), leaves=leaves) for f in near])
     return [f for f in made if f is not None]
 
 
 def _traced(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
-    """Pairs near the best of which one effect has a place, as a layer its depth, tried all along: one valley of many.
+    """Pairs near the best of which one effect has a threshold, as a layer its depth, scanned over all of its range.
 
     None where the best leaves no more than noise.
     """
-    ranked = sorted(pairs, key=lambda f: f.left)
+    ranked = sorted(pairs, key=lambda f: f.chi2)
     if (
         mismatch_of(inquiry.problem.dataset, ranked[0].blocks, inquiry.phases).p_value
         > SETTINGS.inference.lack_of_fit.p_value
     ):
         return []
-    near = (f for f in ranked if f.left < TUNING.placed_misfit * ranked[0].left)
+    near = (f for f in ranked if f.chi2 < TUNING.placed_misfit * ranked[0].chi2)
     ways = (way for f in near for way in (f, inquiry.problem.again(first_effect_last(f))))
     able = itertools.islice(
         (way for way in ways if threshold_ranges(way) and not way.candidates[-1].is_oscillatory), TUNING.placed
@@ -268,21 +270,21 @@ def _is_oscillatory(pair: Fitted) -> bool:
 
 
 def _partners(
-    inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: ScoreTest, scored: int
+    inquiry: Inquiry, first: Step, taken: Sequence[Step], scored: ScoreTest, count: int
 ) -> list[tuple[Candidate, tuple[float, ...]]]:
     """Who may be one of two, and where its fit begins; what was bent to lead alone also in its usual shape.
 
-    Those that led, and of the others so many that `scored` most at first.
+    Those that led, and of the others the first `count` by their score.
     """
-    leading = sorted((inquiry.problem.again(f) for f in first.rivals), key=lambda f: f.left)[: TUNING.leading]
-    later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[: TUNING.following]]
+    leading = sorted((inquiry.problem.again(f) for f in first.rivals), key=lambda f: f.chi2)[: TUNING.leading]
+    later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.chi2)[: TUNING.following]]
     found: dict[tuple[str, bool], tuple[Candidate, tuple[float, ...]]] = {}
     for f in (*leading, *later):
         last = f.candidates[-1]
         found.setdefault((last.key, last.has_secondary), (last, f.own))
     known, varied = {key for key, _ in found}, {key for key, has_secondary in found if has_secondary}
-    ranked = sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
+    ranked = sorted(first.screened, key=lambda s: -scored.scores.get(s.candidate.key, 0.0))
     for k, s in enumerate(ranked):
-        if s.candidate.key in varied or (k < scored and s.candidate.key not in known):
+        if s.candidate.key in varied or (k < count and s.candidate.key not in known):
             found.setdefault((s.candidate.key, s.candidate.has_secondary), (s.candidate, s.starts[0]))
     return list(found.values())

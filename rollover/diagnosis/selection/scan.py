@@ -1,4 +1,4 @@
-"""Looks at all candidates: where each costs a run on few recordings first, and by known runs where they will do."""
+"""Score test of all candidates: where runs are dear on few recordings first, and by cached runs where they suffice."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from itertools import zip_longest
 
 import numpy as np
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.local_search import left_at
+from rollover.diagnosis.fit.cross_validation import Groups
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
+from rollover.diagnosis.fit.local_search import chi2_at
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
-from rollover.diagnosis.fit.step import Groups
-from rollover.diagnosis.selection.ensemble_validation import with_shifts_near_prior
+from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
+from rollover.diagnosis.fit.time_shift import with_shifts_near_prior
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value, score_test
 from rollover.diagnosis.selection.screening import initial_time_shifts, representative_few
 from rollover.diagnosis.settings import SETTINGS
@@ -21,14 +22,14 @@ from rollover.diagnosis.settings import SETTINGS
 TUNING = SETTINGS.selection.scan
 
 
-def look(
+def score_candidates(
     problem: Problem,
     base: Fitted,
     candidates: Sequence[Candidate],
     groups: Groups,
     beside: Fitted | None = None,
     few: Sequence[int] = (),
-    parallel_map: ParallelMap = serial_map,
+    parallel_map: ParallelMap[Problem] = serial_map,
 ) -> ScoreTest:
     """A gate by all recordings; where each look costs a run, of few and then of the best candidates by some more.
 
@@ -75,7 +76,7 @@ def strong_starts(
     shifts = initial_time_shifts(problem, base)
 
     def left(way: Sequence[Candidate], x: Sequence[float], use: Sequence[int]) -> float:
-        found = left_at(problem, (*base.candidates, *way), (*base.x, *x), shifts, use)
+        found = chi2_at(problem, (*base.candidates, *way), (*base.x, *x), shifts, use)
         return np.inf if found is None else found
 
     worst = max(few, key=lambda r: left((), (), [r]))
@@ -120,7 +121,7 @@ def _step_reduced(
     if len(more) <= len(few):
         return first, first
     moving = sorted((c for c in candidates if c.kind != "sensor"), key=lambda c: -first.scores.get(c.key, 0.0))
-    closer = [replace(c, places=first.places.get(c.key, ())) for c in moving[: effort.shortlist]]
+    closer = [replace(c, points=first.points.get(c.key, ())) for c in moving[: effort.shortlist]]
     second = score_test(problem, base, [*closer, *(c for c in candidates if c.kind == "sensor")], more, beside)
     return first, replace(
         second,
@@ -142,14 +143,14 @@ def rescored(
     candidates: Sequence[Candidate],
     groups: Groups,
     first: ScoreTest,
-    parallel_map: ParallelMap = serial_map,
+    parallel_map: ParallelMap[Problem] = serial_map,
 ) -> ScoreTest:
     """A look beside an explanation; where looks cost runs, by what candidates move beside the `base`, if that is given.
 
     Those runs are known from the `first` look. Only if the best of their directions tells something are others made.
     """
     if base is not None and problem.effort.is_ensemble:
-        hinted = look(problem, current, candidates, groups, base, first.only)
+        hinted = score_candidates(problem, current, candidates, groups, base, first.only)
         if hinted.p_value() > TUNING.hint_p_value:
             return hinted
-    return look(problem, current, candidates, groups, parallel_map=parallel_map)
+    return score_candidates(problem, current, candidates, groups, parallel_map=parallel_map)

@@ -17,22 +17,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.linearisation import without_shift_direction
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, without_shift_direction
 from rollover.diagnosis.fit.parameterisation import (
     Candidate,
     followed,
     is_limit,
     null_of,
 )
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
+from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.noise.ensemble import gained
-from rollover.diagnosis.selection.pair_score import best_direction_pairs
 from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-Place = tuple[str, tuple[float, ...]]  # a candidate's key, and coordinates of it
+ScanPoint = tuple[str, tuple[float, ...]]  # a candidate's key, and coordinates of it
 TUNING = SETTINGS.selection.score_test
+PAIRS = SETTINGS.selection.pair_score
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,8 +54,8 @@ class ScoreTest:
     only: tuple[int, ...] = ()
     leading: tuple[str, ...] = ()
     far: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
-    places: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
-    both: tuple[tuple[Place, Place], ...] = ()
+    points: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+    both: tuple[tuple[ScanPoint, ScanPoint], ...] = ()
 
     @property
     def best(self) -> str:
@@ -80,9 +80,9 @@ def score_test(
     candidates: Sequence[Candidate],
     only: Sequence[int] | None = None,
     beside: Fitted | None = None,
-    parallel_map: ParallelMap = serial_map,
+    parallel_map: ParallelMap[Problem] = serial_map,
 ) -> ScoreTest:
-    """Look at every candidate beside the base, in all recordings or `only` some, from the base's own time shifts.
+    """Score every candidate beside the base, in all recordings or `only` some, from the base's own time shifts.
 
     Directions are what candidates move `beside` another fit, where that is given: the null holds for any directions.
     `parallel_map` works them off.
@@ -96,9 +96,9 @@ def score_test(
     own, _ = np.linalg.qr(held)
     columns, seen_at, sizes = [], [], []
     quiet = _before_the_impact(problem, use)
-    problem.made_ahead((r, (*at.candidates, c), (*at.x, *x)) for c in candidates for x in c.probes() for r in use)
-    look = partial(_directions, at=(at.candidates, at.x), blocks=base.blocks, use=tuple(use))
-    for c, found in zip(candidates, parallel_map(problem, look, candidates), strict=True):
+    problem.made_ahead((r, (*at.candidates, c), (*at.x, *x)) for c in candidates for x in c.scan_points() for r in use)
+    directions = partial(_directions, at=(at.candidates, at.x), blocks=base.blocks, use=tuple(use))
+    for c, found in zip(candidates, parallel_map(problem, directions, candidates), strict=True):
         for x, d in found:
             parts = [(d, TUNING.least_direction)]
             if c.kind != "sensor" and quiet is not None:
@@ -121,14 +121,14 @@ def score_test(
     detectable: dict[str, float] = {}
     own_best: dict[str, float] = {}
     ways: dict[str, list[tuple[float, ...]]] = {}
-    places: dict[str, list[tuple[float, ...]]] = {}
+    points: dict[str, list[tuple[float, ...]]] = {}
     for k in np.argsort(-scores, kind="stable"):
         c, x = seen_at[k]
         shows = _visible(c, x, sizes[k])
         if shows is not None:
             detectable[c.key] = (max if is_limit(c) else min)(shows, detectable.get(c.key, shows))
         own_best.setdefault(c.key, float(scores[k]))
-        if x not in (seen := places.setdefault(c.key, [])):
+        if x not in (seen := points.setdefault(c.key, [])):
             seen.append(x)
         start = followed(c, x, float(along[k]) / sizes[k])
         if start is not None and len(ways.setdefault(c.key, [])) < TUNING.ways:
@@ -137,7 +137,7 @@ def score_test(
     both = []
     for pair in [] if problem.effort.is_ensemble else best_direction_pairs(along, cosines, [c.key for c, _ in seen_at]):
         one, other = (
-            _scaled_start(*seen_at[k], far / sizes[k]) for k, far in zip(pair.places, pair.along, strict=True)
+            _scaled_start(*seen_at[k], far / sizes[k]) for k, far in zip(pair.columns, pair.along, strict=True)
         )
         both.append((one, other))
     return ScoreTest(
@@ -147,7 +147,7 @@ def score_test(
         detectable=detectable,
         starts={key: tuple(each) for key, each in ways.items()},
         only=tuple(only or ()),
-        places={key: tuple(each[: TUNING.close_places]) for key, each in places.items()},
+        points={key: tuple(each[: TUNING.close_points]) for key, each in points.items()},
         both=tuple(both),
     )
 
@@ -161,7 +161,7 @@ def _before_the_impact(problem: Problem, use: Sequence[int]) -> Array | None:
     return None if stacked.all() or not stacked.any() else stacked
 
 
-def _scaled_start(c: Candidate, x: tuple[float, ...], factor: float) -> Place:
+def _scaled_start(c: Candidate, x: tuple[float, ...], factor: float) -> ScanPoint:
     """Where a direction leads: `factor` times as strong as at x, or x itself where there is no zero to go from."""
     return c.key, followed(c, x, factor) or x
 
@@ -230,8 +230,8 @@ def _directions(
     problem: Problem, c: Candidate, *, at: Point, blocks: Sequence[ResidualBlock], use: Sequence[int]
 ) -> list[tuple[tuple[float, ...], Array]]:
     """Where a candidate is looked at beside a point, and what it moves there in the recordings `use`."""
-    places = (*c.probes(), *(c.further() if problem.effort.is_ensemble else ()))
-    found = [(x, _direction(problem, at, blocks, c, x, use)) for x in places]
+    points = (*c.scan_points(), *(c.further() if problem.effort.is_ensemble else ()))
+    found = [(x, _direction(problem, at, blocks, c, x, use)) for x in points]
     return [(x, d) for x, d in found if d is not None]
 
 
@@ -261,16 +261,8 @@ def _visible(c: Candidate, x: Sequence[float], size: float) -> float | None:
     return value if is_limit(c) and size >= TUNING.visible else None
 
 
-def null_of_maximum(directions: Sequence[Array], draws: int = TUNING.draws, seed: int = 0) -> Array:
-    """Largest gain on noise (draws,), sorted; `directions` are, for each recording, arrays (n_r, m)."""
-    m = directions[0].shape[1] if len(directions) else 0
-    if m == 0:
-        return np.zeros(draws)
-    return null_from_gram(sum((np.asarray(d).T @ np.asarray(d) for d in directions), np.zeros((m, m))), draws, seed)
-
-
 def null_from_gram(G: Array, draws: int = TUNING.draws, seed: int = 0) -> Array:
-    """The same by the scalar products of the directions (m, m)."""
+    """Largest gain on noise (draws,), sorted, by the scalar products of the directions (m, m)."""
     m = len(G)
     size = np.sqrt(np.maximum(np.diag(G), 1e-300))
     root = np.linalg.cholesky(G / np.outer(size, size) + TUNING.jitter * m * np.eye(m))
@@ -287,3 +279,37 @@ def p_value(gain: float, null: Array) -> float:
 
     anchor = float(null[-10])
     return float(10.0 / null.size * chdtrc(1, gain) / max(chdtrc(1, anchor), 1e-300))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Both:
+    """Two directions, by their places among all, what they gain together, and how far along each that is."""
+
+    columns: tuple[int, int]
+    gain: float
+    along: tuple[float, float]
+
+
+def best_direction_pairs(along: Array, cosines: Array, owners: Sequence[str]) -> list[Both]:
+    """The best two directions of each pair of owners, the pair that gains most first.
+
+    With z (m,) the misfit along unit directions and c their cosines (m, m), two gain
+    g = (z_i^2 + z_j^2 - 2 c z_i z_j)/(1 - c^2) along a_i = (z_i - c z_j)/(1 - c^2): least squares of two columns. What
+    two that are nearly one would gain by their difference is no more than arithmetic.
+    """
+    z, c = along, np.clip(cosines, -1.0, 1.0)
+    rest = 1.0 - c**2
+    able = rest > PAIRS.same_direction
+    rest = np.where(able, rest, 1.0)
+    gains = np.where(able, (z[:, None] ** 2 + z[None, :] ** 2 - 2.0 * c * np.outer(z, z)) / rest, 0.0)
+    best: dict[frozenset[str], Both] = {}
+    upper = np.triu_indices(z.size, 1)
+    for k in np.argsort(-gains[upper], kind="stable"):
+        i, j = int(upper[0][k]), int(upper[1][k])
+        pair = frozenset((owners[i], owners[j]))
+        if len(pair) == 2 and pair not in best:
+            far = ((z[i] - c[i, j] * z[j]) / rest[i, j], (z[j] - c[i, j] * z[i]) / rest[i, j])
+            best[pair] = Both(columns=(i, j), gain=float(gains[i, j]), along=(float(far[0]), float(far[1])))
+            if len(best) == PAIRS.most_pairs:
+                break
+    return list(best.values())

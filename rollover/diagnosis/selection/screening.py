@@ -1,4 +1,4 @@
-"""Candidates looked at on a few recordings, in a few places each: which are worth a fit, and where it may begin."""
+"""Candidates screened on a few recordings at a few points each: which are worth a fit, and where it may begin."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from functools import partial
 import numpy as np
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
-from rollover.diagnosis.fit.linearisation import without_shift_direction
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, without_shift_direction
 from rollover.diagnosis.fit.parameterisation import Candidate, same_family
-from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
-from rollover.diagnosis.fit.step import Screened
+from rollover.diagnosis.fit.step import Inquiry, Screened
+from rollover.diagnosis.fit.tasks import ParallelMap, serial_map
 from rollover.diagnosis.fit.time_shift import shifts_from_contact
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
@@ -27,9 +26,9 @@ def representative_few(
     base: Fitted, groups: Sequence[Sequence[int]], few: int = SETTINGS.forward.drops.few
 ) -> list[int]:
     """Few recordings that stand for all: of the conditions that are met worst, best, and in the middle."""
-    left = [b.normal()[2] / b.residual.size for b in base.blocks]
-    members = [max(g, key=lambda r: left[r]) for g in groups if g]
-    members.sort(key=lambda r: left[r])
+    misfits = [b.normal()[2] / b.residual.size for b in base.blocks]
+    members = [max(g, key=lambda r: misfits[r]) for g in groups if g]
+    members.sort(key=lambda r: misfits[r])
     if len(members) <= few:
         return sorted(set(members)) if len(groups) > 1 else list(range(len(base.blocks)))[:few]
     return sorted({members[round(k * (len(members) - 1) / (few - 1))] for k in range(few)})
@@ -38,10 +37,10 @@ def representative_few(
 def is_far(problem: Problem, base: Fitted) -> bool:
     """Whether a base is so far off that its time shifts tell of what is missing; beside a tolerance that is soon."""
     far = TUNING.fixed_shifts if problem.samples_per_error == 1.0 else 1.0
-    return base.left > far**2 * sum(b.residual.size for b in base.blocks)
+    return base.chi2 > far**2 * sum(b.residual.size for b in base.blocks)
 
 
-def initial_time_shifts(problem: Problem, base: Fitted, parallel_map: ParallelMap = serial_map) -> list[float]:
+def initial_time_shifts(problem: Problem, base: Fitted, parallel_map: ParallelMap[Problem] = serial_map) -> list[float]:
     """Time shifts (s) to begin with: where the base is off its own are bent by what is missing, the contact's hardly.
 
     Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left.
@@ -51,7 +50,7 @@ def initial_time_shifts(problem: Problem, base: Fitted, parallel_map: ParallelMa
         contact_shifts: list[float | None] = [None] * len(base.blocks)
         if not problem.effort.is_ensemble and not is_far(problem, base):
             return [b.shift for b in base.blocks]
-    elif base.left < TUNING.biased_shifts**2 * count:
+    elif base.chi2 < TUNING.biased_shifts**2 * count:
         return [b.shift for b in base.blocks]
     else:
         contact_shifts = shifts_from_contact(problem, base.candidates, base.x, parallel_map)
@@ -67,11 +66,11 @@ def screen(
     candidates: Sequence[Candidate],
     few: Sequence[int],
     shifts: Sequence[float],
-    looked: ScoreTest,
+    scored: ScoreTest,
 ) -> list[Screened]:
-    """Look at each candidate in some places beside the base, on a few recordings, from time `shifts` (s) of all.
+    """Screen each candidate at some points beside the base, on a few recordings, from time `shifts` (s) of all.
 
-    Not far from an explanation the places to which `looked` leads are enough.
+    Not far from an explanation the points to which `scored` leads are enough.
     """
     problem = inquiry.problem
     beside = [problem.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]
@@ -80,31 +79,31 @@ def screen(
         return []
     near = not is_far(problem, base) and not problem.effort.is_ensemble
 
-    def places(c: Candidate) -> tuple[tuple[float, ...], ...]:
-        ways = () if problem.effort.is_ensemble and not c.is_placed else looked.starts.get(c.key, ())
+    def points(c: Candidate) -> tuple[tuple[float, ...], ...]:
+        ways = () if problem.effort.is_ensemble and not c.is_placed else scored.starts.get(c.key, ())
         is_led = (near or c.is_placed) and ways and not c.is_discontinuous
         return tuple(ways if is_led else (*ways, *c.starts()))
 
-    problem.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in places(c) for r in few)
-    things = [_Look(candidate=c, places=places(c), far=looked.far.get(c.key, ())) for c in candidates]
-    look = partial(
+    problem.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in points(c) for r in few)
+    items = [_Screening(candidate=c, points=points(c), far=scored.far.get(c.key, ())) for c in candidates]
+    screening = partial(
         _screened, base=(base.candidates, base.x), few=tuple(few), shifts=tuple(shifts[r] for r in few), blocks=blocks
     )
-    return [s for s in inquiry.parallel_map(look, things) if s is not None]
+    return [s for s in inquiry.parallel_map(screening, items) if s is not None]
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Look:
-    """A candidate, where it is looked at, and where it may begin in any case."""
+class _Screening:
+    """A candidate, the points at which it is screened, and where it may begin in any case."""
 
     candidate: Candidate
-    places: tuple[tuple[float, ...], ...]
+    points: tuple[tuple[float, ...], ...]
     far: tuple[tuple[float, ...], ...]
 
 
 def _screened(
     problem: Problem,
-    thing: _Look,
+    item: _Screening,
     *,
     base: Point,
     few: tuple[int, ...],
@@ -112,16 +111,16 @@ def _screened(
     blocks: tuple[ResidualBlock, ...],
 ) -> Screened | None:
     """One candidate looked at beside a base, which few recordings meet by these blocks; None if nothing can be made."""
-    c, potential = thing.candidate, 0.0
+    c, potential = item.candidate, 0.0
     looked_at: list[tuple[bool, float, tuple[float, ...]]] = []
-    for start in thing.places:
-        left, along, size, count = 0.0, 0.0, 0.0, 0
+    for start in item.points:
+        chi2, along, size, count = 0.0, 0.0, 0.0, 0
         for r, shift, block in zip(few, shifts, blocks, strict=True):
             there = problem.block(r, (*base[0], c), (*base[1], *start), shift, 0.0)
             if there is None:
                 break
             count += 1
-            left += there.normal()[2]
+            chi2 += there.normal()[2]
             way = block.counted(block.unweighted_residual - there.unweighted_residual)
             free = without_shift_direction(np.column_stack([way, block.residual]), block)
             along += float(free[:, 0] @ free[:, 1])
@@ -131,13 +130,13 @@ def _screened(
         is_still = size <= TUNING.no_change
         if not is_still:
             potential = max(potential, along * along / size)
-        looked_at.append((is_still, left, start))
+        looked_at.append((is_still, chi2, start))
     if not looked_at:
         return None
     # a fit finds no way from where nothing moves, however little less is left there than where too much does
-    met = [(left, start) for _, left, start in sorted(looked_at)]
-    starts = tuple(dict.fromkeys((*thing.far, *_begun_at(c, met))))
-    return Screened(candidate=c, starts=starts, left=met[0][0], potential=potential)
+    met = [(chi2, start) for _, chi2, start in sorted(looked_at)]
+    starts = tuple(dict.fromkeys((*item.far, *_begun_at(c, met))))
+    return Screened(candidate=c, starts=starts, chi2=met[0][0], potential=potential)
 
 
 def of_same_family(ranked: Sequence[Candidate], taken: int, leaders: int) -> list[Candidate]:
@@ -165,13 +164,13 @@ def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float,
 
 
 def promising(
-    candidates: Sequence[Candidate], looked: ScoreTest, effort: Effort = SETTINGS.forward.drops
+    candidates: Sequence[Candidate], scored: ScoreTest, effort: Effort = SETTINGS.forward.drops
 ) -> list[Candidate]:
     """Those that scored best, and of two parameters all: beside their thresholds a score tells little.
 
     Where each costs runs, of these only the family of what leads, and a few that move the vehicle in any case.
     """
-    ranked = looked.ranked(candidates)
+    ranked = scored.ranked(candidates)
     if effort.scored is not None:
         moving = [c for c in ranked if c.kind != "sensor"][: effort.promising]
         related = of_same_family(ranked, effort.scored, effort.leaders)

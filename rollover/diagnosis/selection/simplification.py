@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from rollover.diagnosis.fit.jobs import Task
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import first_effect_last
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, first_effect_last, is_at_bound
 from rollover.diagnosis.fit.local_search import ended, polish, with_time_shift_search, without_effect
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinates, with_slices
-from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.fit.step import Inquiry, Step
+from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.flexibility import is_over_flexible
-from rollover.diagnosis.selection.forward_step import ends_at_bound
 from rollover.diagnosis.selection.restarts import continued_from, with_thresholds_traced
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
@@ -30,23 +28,23 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     elsewhere.
     """
     problem, phases, old = inquiry.problem, inquiry.phases, found.fitted
-    left = mismatch_of(problem.dataset, old.blocks, phases)
-    is_near = old.left < SETTINGS.selection.forward_step.nearly_noise**2 * sum(b.residual.size for b in old.blocks)
+    mismatch = mismatch_of(problem.dataset, old.blocks, phases)
+    is_near = old.chi2 < SETTINGS.selection.forward_step.nearly_noise**2 * sum(b.residual.size for b in old.blocks)
     if problem.effort.is_ensemble or not is_near:
-        return found, left
+        return found, mismatch
     if not is_over_flexible(old.effects):  # as they stand these will be refused, however well they fit
         new = with_thresholds_traced(inquiry, old)
-        if new.left < old.left or len(old.effects) > 1 or left.p_value < TUNING.full_p_value:
+        if new.chi2 < old.chi2 or len(old.effects) > 1 or mismatch.p_value < TUNING.full_p_value:
             new = with_time_shift_search(problem, polish(problem, new))
         new = ended(problem, new)
-        if new.left < old.left:
+        if new.chi2 < old.chi2:
             found = _with_rivals(inquiry, found.moved_to(new))
-            left = mismatch_of(problem.dataset, new.blocks, phases)
-    for simple in (simpler, _in_usual_shapes, with_fewer_parameters):
+            mismatch = mismatch_of(problem.dataset, new.blocks, phases)
+    for simple in (simpler, _with_usual_secondary, with_fewer_parameters):
         other = simple(inquiry, found)
         if other is not None:
-            found, left = other, mismatch_of(problem.dataset, other.fitted.blocks, phases)
-    return found, left
+            found, mismatch = other, mismatch_of(problem.dataset, other.fitted.blocks, phases)
+    return found, mismatch
 
 
 def simpler(inquiry: Inquiry, found: Step) -> Step | None:
@@ -57,13 +55,13 @@ def simpler(inquiry: Inquiry, found: Step) -> Step | None:
     """
     best, beside, shared = found.fitted, *_shared(found.fitted)
     begun = list(_limiting_effects(inquiry, best))
-    if ends_at_bound(best):
-        able = sorted(found.rivals, key=lambda f: f.left)
-        able = [f for f in able if len(f.own) < len(best.own) and f.left < found.base.left][: TUNING.simpler_rivals]
+    if is_at_bound(best):
+        able = sorted(found.rivals, key=lambda f: f.chi2)
+        able = [f for f in able if len(f.own) < len(best.own) and f.chi2 < found.base.chi2][: TUNING.simpler_rivals]
         begun += [((*beside, f.candidates[-1]), f.own) for f in able]
     shifts = tuple(b.shift for b in best.blocks)
     tasks = [Task(candidates=candidates, start=(*shared, *own), shifts=shifts, width=1) for candidates, own in begun]
-    one = min((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.left, default=None)
+    one = min((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.chi2, default=None)
     if one is None or not _is_as_good(one, best):
         return None
     return _with_best(one, found)
@@ -89,17 +87,17 @@ def _with_rivals(inquiry: Inquiry, found: Step) -> Step:
     best, beside, shared = found.fitted, *_shared(found.fitted)
     if len(best.effects) < 2:
         return found
-    shifts, near = tuple(b.shift for b in best.blocks), sorted(found.rivals, key=lambda f: f.left)[: TUNING.rivals]
+    shifts, near = tuple(b.shift for b in best.blocks), sorted(found.rivals, key=lambda f: f.chi2)[: TUNING.rivals]
     begun = [f for f in near if f is not best]
     tasks = [
         Task(candidates=(*beside, f.candidates[-1]), start=(*shared, *f.own), shifts=shifts, width=1) for f in begun
     ]
     better = {id(f): again for f, again in zip(begun, inquiry.fits(tasks), strict=True) if again is not None}
-    rivals = (min(f, better.get(id(f), f), key=lambda one: one.left) for f in found.rivals)
+    rivals = (min(f, better.get(id(f), f), key=lambda one: one.chi2) for f in found.rivals)
     return replace(found, rivals=tuple(rivals))
 
 
-def _in_usual_shapes(inquiry: Inquiry, found: Step) -> Step | None:
+def _with_usual_secondary(inquiry: Inquiry, found: Step) -> Step | None:
     """A step of several effects with those in their usual shape that need no other beside each other; None if none.
 
     What had to be bent to do another's work as well is straight again once that stands beside it.
@@ -117,7 +115,7 @@ def _in_usual_shapes(inquiry: Inquiry, found: Step) -> Step | None:
     fits = [f for f in inquiry.fits(tasks) if f is not None and _is_as_good(f, best)]
     if not fits:
         return None
-    return _with_best(min(fits, key=lambda f: (len(f.x), f.left)), found)
+    return _with_best(min(fits, key=lambda f: (len(f.x), f.chi2)), found)
 
 
 def with_fewer_parameters(inquiry: Inquiry, found: Step) -> Step | None:
@@ -151,7 +149,7 @@ def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
     tasks = [
         Task(
             candidates=(*beside, c),
-            start=(*shared, *c.probes()[0]),
+            start=(*shared, *c.scan_points()[0]),
             shifts=shifts,
             rounds=SETTINGS.selection.forward_step.short_rounds,
         )
@@ -159,8 +157,8 @@ def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
     ]
     short = sorted((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.total)[: TUNING.simpler_effects]
     whole = inquiry.fits([continued_from(f, "fit") for f in short])
-    one = min((f for f in whole if f is not None), key=lambda f: f.left, default=None)
-    if one is None or one.left > SETTINGS.selection.restarts.leading_misfit * best.left:
+    one = min((f for f in whole if f is not None), key=lambda f: f.chi2, default=None)
+    if one is None or one.chi2 > SETTINGS.selection.restarts.leading_misfit * best.chi2:
         return None
     one = inquiry.fits([continued_from(one, "polish")])[0] or one
     return _with_best(one, found) if _is_as_good(one, best) else None
@@ -173,7 +171,7 @@ def with_mirror_rivals(inquiry: Inquiry, found: Step) -> Step:
     """
     for new in mirror_images(inquiry, found.fitted, *_shared(found.fitted)):
         known = [f for f in found.rivals if f.candidates[-1].key == new.candidates[-1].key]
-        if all(new.left < f.left for f in known):
+        if all(new.chi2 < f.chi2 for f in known):
             others = (f for f in found.rivals if not any(f is one for one in known))
             found = replace(found, rivals=(*others, new))
     return found
@@ -230,5 +228,5 @@ def _with_best(new: Fitted, found: Step) -> Step:
 
 def _is_as_good(simple: Fitted, best: Fitted) -> bool:
     """Whether a fit of fewer numbers leaves hardly more than the best."""
-    dispersion = max(1.0, best.left / sum(b.residual.size for b in best.blocks))
-    return simple.left < best.left + dispersion * TUNING.chi_square * (len(best.x) - len(simple.x))
+    dispersion = max(1.0, best.chi2 / sum(b.residual.size for b in best.blocks))
+    return simple.chi2 < best.chi2 + dispersion * TUNING.chi_square * (len(best.x) - len(simple.x))

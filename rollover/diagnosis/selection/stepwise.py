@@ -6,28 +6,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeGuard
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.data.phases import Phases
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import (
-    has_uncertain_conditions,
-    refitted_with_conditions,
     with_time_shift_search,
 )
-from rollover.diagnosis.fit.step import Phases, Step
+from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.time_shift import is_explained_by_clocks
-from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
-from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import Mismatch, is_enough, is_tolerated, mismatch_of
 from rollover.diagnosis.noise.ensemble import has_diverged
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.ensemble_validation import (
     ensemble_validated,
     restarted_base,
     with_full_weights,
     without_unsupported_rivals,
 )
+from rollover.diagnosis.selection.explanation import with_conditions_refitted
 from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.forward_step import largest_change, size_of_effect, step, with_noise_of_fit
 from rollover.diagnosis.selection.pairs import best_subsets, with_first_exchanged
-from rollover.diagnosis.selection.scan import look, rescored
+from rollover.diagnosis.selection.scan import rescored, score_candidates
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.simplification import followed
 from rollover.diagnosis.settings import SETTINGS
@@ -39,7 +38,7 @@ TUNING = SETTINGS.selection.stepwise
 class Taken:
     """The base, the steps taken beside it, the fit with all of them (the base itself if none), and what it leaves.
 
-    `first` is the first step, taken or not; `at_first` what all candidates scored beside the base, `looked` beside the
+    `first` is the first step, taken or not; `at_first` what all candidates scored beside the base, `scored` beside the
     last fit; `refuted` whether the best candidate's gain did not outlast the scatter of its own runs; `paired` whether
     all were tried two by two.
     """
@@ -48,10 +47,10 @@ class Taken:
     steps: tuple[Step, ...]
     fitted: Fitted
     before: Mismatch
-    left: Mismatch
+    after: Mismatch
     first: Step | None
     at_first: ScoreTest
-    looked: ScoreTest
+    scored: ScoreTest
     refuted: bool = False
     paired: bool = False
 
@@ -67,6 +66,7 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
     Two that leave more than noise are given for the best of all `pairs`, if these are to be tried.
     """
     problem, candidates, groups, phases = inquiry.problem, inquiry.candidates, inquiry.groups, inquiry.phases
+    parallel_map = inquiry.executor.parallel_map
     count = sum(b.residual.size for b in base.blocks)
     clocked = restarted_base if problem.effort.is_ensemble else with_time_shift_search
     base = clocked(problem, base)  # what a clock leaves is no noise,
@@ -76,75 +76,71 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
     before = mismatch_of(problem.dataset, base.blocks, phases)
     base = with_full_weights(problem, base)
     inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
-    looked = first_look = look(problem, base, candidates, groups, parallel_map=inquiry.executor.parallel_map)
+    scored = first_scored = score_candidates(problem, base, candidates, groups, parallel_map=parallel_map)
 
-    def beside(fitted: Fitted, left: Mismatch) -> ScoreTest:
-        known = base if is_enough(problem, fitted, left) else None
-        return rescored(problem, fitted, known, inquiry.free(fitted), groups, first_look, inquiry.executor.parallel_map)
+    def beside(fitted: Fitted, mismatch: Mismatch) -> ScoreTest:
+        known = base if is_enough(problem, fitted, mismatch) else None
+        return rescored(problem, fitted, known, inquiry.free(fitted), groups, first_scored, parallel_map)
 
-    current, left = base, before
+    current, mismatch = base, before
     taken = list(begun)
     first = taken[0] if taken else None
     if taken:
         current = taken[-1].fitted
-        left = mismatch_of(problem.dataset, current.blocks, phases)
-        looked = beside(current, left)
+        mismatch = mismatch_of(problem.dataset, current.blocks, phases)
+        scored = beside(current, mismatch)
     refuted = paired = False
     for _ in range(SETTINGS.selection.flexibility.most_effects - len(begun)):
         if is_tolerated(problem, current):
             break
-        if looked.p_value() > TUNING.admitting_p_value and is_enough(problem, current, left):
+        if scored.p_value() > TUNING.admitting_p_value and is_enough(problem, current, mismatch):
             break
-        if (
-            not taken
-            and not problem.effort.is_ensemble
-            and is_explained_by_clocks(problem, base, inquiry.executor.parallel_map)
-        ):
+        if not taken and not problem.effort.is_ensemble and is_explained_by_clocks(problem, base, parallel_map):
             break
-        tried = step(inquiry, current, looked)
+        tried = step(inquiry, current, scored)
         first = first or tried
         if not is_beyond_chance(tried, problem, phases):
             break
-        found = validated_step(inquiry, tried, looked)
+        found = validated_step(inquiry, tried, scored)
         if found is None and not taken:
             found = with_other_weighting(inquiry, current)
             first = found or first
         if found is None:
             refuted = not taken
             break
-        found, left = with_conditions_refitted(problem, *followed(inquiry, found), phases)
+        found, mismatch = with_conditions_refitted(problem, *followed(inquiry, found), phases)
         taken.append(found)
         current = found.fitted
         if not problem.heavy_tailed:
             current = with_full_weights(problem, current)
-            left = mismatch_of(problem.dataset, current.blocks, phases)
-        if len(taken) == 2 and not is_enough(problem, current, left):
+            mismatch = mismatch_of(problem.dataset, current.blocks, phases)
+        if len(taken) == 2 and not is_enough(problem, current, mismatch):
             # of two that are strong the first may have been taken for something else
             other = None
             if pairs and not problem.effort.is_ensemble:
-                other, paired = best_subsets(inquiry, taken, first_look, current), True
-            elif problem.effort.is_ensemble and current.left - count < TUNING.hopeless_share * (base.left - count):
+                other, paired = best_subsets(inquiry, taken, first_scored, current), True
+            elif problem.effort.is_ensemble and current.chi2 - count < TUNING.hopeless_share * (base.chi2 - count):
                 other = with_first_exchanged(inquiry, taken, current)
             if other is not None:
-                (taken, left), current = other, other[0][-1].fitted
+                (taken, mismatch), current = other, other[0][-1].fitted
         is_lost = len(taken) > 1 and (
             is_hopeless(problem, base, current) or is_third_unlikely(problem, taken[-1], current)
         )
         if is_lost or is_over_flexible(current.effects):
             break
-        looked = beside(current, left)
+        scored = beside(current, mismatch)
     if not problem.heavy_tailed:
         problem.heavy_tailed, current = True, problem.again(current)
-        left = mismatch_of(problem.dataset, current.blocks, phases)
+        mismatch = mismatch_of(problem.dataset, current.blocks, phases)
     return Taken(
         base=base,
         steps=tuple(taken),
         fitted=current,
         before=before,
-        left=left,
+        after=mismatch,
         first=first,
-        at_first=first_look,
-        looked=looked,
+        at_first=first_scored,
+        scored=scored,
         refuted=refuted,
         paired=paired,
     )
@@ -153,13 +149,13 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
 def is_hopeless(problem: Problem, base: Fitted, current: Fitted) -> bool:
     """Whether two effects leave far more than noise, and no small part of what there was beyond it."""
     count, hardly_any = sum(b.residual.size for b in current.blocks), TUNING.little_noise[problem.effort.is_ensemble]
-    return current.left > TUNING.hopeless**2 * count and current.left - count > hardly_any * (base.left - count)
+    return current.chi2 > TUNING.hopeless**2 * count and current.chi2 - count > hardly_any * (base.chi2 - count)
 
 
 def is_third_unlikely(problem: Problem, last: Step, current: Fitted) -> bool:
     """Whether a third effect, of drops, would have to take far more than the second did for nothing to be left."""
-    beyond = current.left - sum(b.residual.size for b in current.blocks)
-    return not problem.effort.is_ensemble and beyond > TUNING.no_third_above * max(last.base.left - current.left, 0.0)
+    beyond = current.chi2 - sum(b.residual.size for b in current.blocks)
+    return not problem.effort.is_ensemble and beyond > TUNING.no_third_above * max(last.base.chi2 - current.chi2, 0.0)
 
 
 def is_beyond_chance(found: Step | None, problem: Problem, phases: Phases) -> TypeGuard[Step]:
@@ -192,7 +188,7 @@ def leaves_mismatch(fitted: Fitted, problem: Problem, phases: Phases) -> bool:
     return not is_enough(problem, fitted, mismatch_of(problem.dataset, fitted.blocks, phases))
 
 
-def validated_step(inquiry: Inquiry, found: Step, looked: ScoreTest) -> Step | None:
+def validated_step(inquiry: Inquiry, found: Step, scored: ScoreTest) -> Step | None:
     """A step as it is to be taken; None where runs scatter and its gain does not outlast that."""
     problem = inquiry.problem
     spoken = (
@@ -201,7 +197,7 @@ def validated_step(inquiry: Inquiry, found: Step, looked: ScoreTest) -> Step | N
         else TUNING.admitting_p_value_runs
     )  # what admitted the step speaks for its best
     return (
-        ensemble_validated(problem, without_unsupported_rivals(found, looked, spoken), inquiry.groups)
+        ensemble_validated(problem, without_unsupported_rivals(found, scored, spoken), inquiry.groups)
         if problem.effort.is_ensemble
         else found
     )
@@ -215,29 +211,13 @@ def with_other_weighting(inquiry: Inquiry, current: Fitted) -> Step | None:
     """
     problem = inquiry.problem
     before = problem.heavy_tailed
-    if before and sum(has_diverged(b.heavy_tail) for b in current.blocks) < TUNING.most_other_courses:
+    if before and sum(has_diverged(b.heavy_tail) for b in current.blocks) < TUNING.most_diverged:
         return None
     problem.heavy_tailed = not before
     base = problem.again(current)
-    looked = look(problem, base, inquiry.candidates, inquiry.groups)
-    tried = step(inquiry, base, looked)
-    found = validated_step(inquiry, tried, looked) if is_beyond_chance(tried, problem, inquiry.phases) else None
+    scored = score_candidates(problem, base, inquiry.candidates, inquiry.groups)
+    tried = step(inquiry, base, scored)
+    found = validated_step(inquiry, tried, scored) if is_beyond_chance(tried, problem, inquiry.phases) else None
     if found is None:
         problem.heavy_tailed = before
     return found
-
-
-def with_conditions_refitted(problem: Problem, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
-    """A step and what it leaves; with the errors of the conditions as they act beside it if that leaves chance alone.
-
-    Else these stay as they act on the scenario as it is: a wrong effect would bend them too.
-    """
-    if is_enough(problem, found.fitted, left) or not has_uncertain_conditions(problem):
-        return found, left
-    before = problem.dataset
-    new = refitted_with_conditions(problem, found.fitted)
-    there = mismatch_of(problem.dataset, new.blocks, phases)
-    if is_enough(problem, new, there):
-        return found.moved_to(new), there
-    problem.with_noise_model(before)
-    return found, left

@@ -15,35 +15,35 @@ import numpy as np
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.phases import PEAK
-from rollover.diagnosis.fit.jobs import Task
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.step import Step
-from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted
+from rollover.diagnosis.fit.step import Inquiry, Step
+from rollover.diagnosis.fit.tasks import Task
+from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.noise.truncation import up_to
-from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.pairs import is_better
 from rollover.diagnosis.selection.stepwise import Taken, forward_selection
 from rollover.diagnosis.settings import SETTINGS
 
 TUNING = SETTINGS.selection.truncated_start
 # of the time to the deepest point: before it, as the ground springs back, and before what bounces comes down again
-ENDS = (1.0 - SETTINGS.data.phases.around_peak, *TUNING.later_ends)
+TRUNCATIONS = (1.0 - SETTINGS.data.phases.around_peak, *TUNING.later_truncations)
 
 
 def loading_first(inquiry: Inquiry, found: Taken) -> Taken:
     """What was found, or a better one begun with what explains the way down alone; only where much is left."""
     problem, base = inquiry.problem, found.base
-    if problem.effort.is_ensemble or found.fitted.left < SETTINGS.selection.stepwise.hopeless**2 * found.count:
+    if problem.effort.is_ensemble or found.fitted.chi2 < SETTINGS.selection.stepwise.hopeless**2 * found.count:
         return found
-    if rebound_residual(inquiry, base) < TUNING.least_share * (found.fitted.left - found.count):
+    if rebound_residual(inquiry, base) < TUNING.least_share * (found.fitted.chi2 - found.count):
         return found  # it came to rest as the simulation does, wherever that was
     steps: Sequence[Step] = ()
-    for end in ENDS:
+    for end in TRUNCATIONS:
         above = _until(inquiry, end, steps)
         if (
             above is None
             or not above.steps
-            or above.fitted.left > SETTINGS.selection.forward_step.nearly_noise**2 * above.count
+            or above.fitted.chi2 > SETTINGS.selection.forward_step.nearly_noise**2 * above.count
         ):
             break
         steps = above.steps
@@ -51,7 +51,7 @@ def loading_first(inquiry: Inquiry, found: Taken) -> Taken:
     if not begun:
         return found
     other = forward_selection(inquiry, base, begun)
-    if is_better(other.fitted, other.left, found.fitted):
+    if is_better(other.fitted, other.after, found.fitted):
         return other
     problem.with_noise_model(held)
     return found
@@ -85,7 +85,7 @@ def _until(inquiry: Inquiry, end: float, steps: Sequence[Step]) -> Taken | None:
     if len(early.dataset) < len(some):
         return None
     inquiry.say(f"up to {end:g} of the way down first")
-    align(early)
+    estimate_time_shifts(early)
     no_jacobian, above = early.fit((), ()), replace(inquiry, problem=early)
     found = (
         forward_selection(above, no_jacobian, _extended_to_end(above, no_jacobian, steps), pairs=False)
@@ -109,7 +109,7 @@ def _extended_to_end(inquiry: Inquiry, base: Fitted, steps: Sequence[Step]) -> l
     made: list[Step] = []
     beside = base
     for s in steps:
-        near = [s.fitted, *sorted((f for f in s.rivals if f is not s.fitted), key=lambda f: f.left)[: TUNING.rivals]]
+        near = [s.fitted, *sorted((f for f in s.rivals if f is not s.fitted), key=lambda f: f.chi2)[: TUNING.rivals]]
         tasks = [Task(candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks)) for f in near]
         best, *rivals = inquiry.fits(tasks)
         if best is None:

@@ -13,8 +13,7 @@ from rollover.diagnosis.settings.fit import Fit
 from rollover.diagnosis.settings.forward import Forward
 from rollover.diagnosis.settings.inference import Inference
 from rollover.diagnosis.settings.noise import Noise
-from rollover.diagnosis.settings.planning import Planning
-from rollover.diagnosis.settings.report import Report
+from rollover.diagnosis.settings.report import Planning, Report
 from rollover.diagnosis.settings.selection import Selection
 
 

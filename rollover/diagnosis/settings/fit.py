@@ -84,8 +84,8 @@ class LocalSearch:
 
     # coordinates (0 to 1) of a damping that lets an oscillation last; chosen
     light_damping: tuple[float, ...] = (0.3, 0.5)
-    coarse_shapes: int = 6  # places of a shape that is varied with an oscillation; chosen
-    fine_shapes: int = 40  # places of a shape that is varied alone; chosen
+    coarse_secondary: int = 6  # places of a shape that is varied with an oscillation; chosen
+    fine_secondary: int = 40  # places of a shape that is varied alone; chosen
     abandon_above: float = 2.0  # ratio to what another explanation leaves: beyond it a fit is abandoned; chosen
     most_shift_trials: int = 40  # trials of a time shift at most; chosen
     condition_rounds: int = 3  # rounds of a fit with errors of the conditions as they act beside it; chosen
@@ -113,7 +113,7 @@ class ModelVariants:
     much_left: float = 2.0  # misfit over the noise: from it on much is left; chosen
     # ratio to an effect's misfit without a shape: a short fit with its true shape leaves less; chosen
     shape_misfit: float = 0.95
-    same_place: float = 0.003  # coordinate (0 to 1): two short fits within it have met; chosen
+    same_point: float = 0.003  # coordinate (0 to 1): two short fits within it have met; chosen
     same_misfit: float = 0.01  # relative difference of misfits: fits near each other within it will meet; chosen
     # ratio to what another explanation leaves: above it a curved valley is not followed; chosen
     no_ridge_above: float = 1.2
@@ -122,7 +122,7 @@ class ModelVariants:
     threshold_high: float = 0.05  # coordinate (0 to 1), from the fit: where it ends; chosen
     threshold_count: int = 13  # places of that scan; chosen
     # coordinates (0 to 1) of a parameter that only this form has; chosen
-    new_places: tuple[float, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)
+    new_points: tuple[float, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)
     meeting_rounds: int = 3  # rounds of all recordings, after which fits are compared; chosen
     meeting_distance: float = 0.1  # coordinate (0 to 1): fits within it then lead to one place; chosen
     # per sample: misfit of a short fit beyond another explanation's that leaves noise; chosen
@@ -150,9 +150,9 @@ class Parameterisation:
     grid_of_one: tuple[int, ...] = (5,)  # places on the axis of an effect of one parameter; chosen
     grid_of_several: tuple[int, ...] = (8, 4, 3)  # places on the axes of an effect of several parameters; chosen
     run_step: float = 0.08  # coordinate (0 to 1): step off zero where each place costs a full run; chosen
-    limit_places: tuple[float, ...] = (0.12, 0.3)  # coordinates (0 to 1): further places of a limit; chosen
+    limit_points: tuple[float, ...] = (0.12, 0.3)  # coordinates (0 to 1): further places of a limit; chosen
     # coordinates (0 to 1): places of a depth or length that has no zero; chosen
-    length_places: tuple[float, ...] = (0.12, 0.3, 0.6)
+    length_points: tuple[float, ...] = (0.12, 0.3, 0.6)
     end_distance: float = 0.01  # coordinate (0 to 1): distance of a start from the ends of its range; chosen
     sliding_tilt: float = 2.0  # tangent of the tilt at which a load slides; chosen
     strong_shares: tuple[float, ...] = (0.35, 0.9)  # shares of the way from an effect's zero to an end; chosen

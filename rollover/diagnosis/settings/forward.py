@@ -37,7 +37,7 @@ class Effort:
 class Perturbation(NamedTuple):
     """Where the grid lies, of an element; its spacing and that of contact points over their own; parts of a step."""
 
-    place: tuple[float, float]
+    grid_offset: tuple[float, float]
     spacing: float = 1.0
     points: float = 1.0
     parts: int = 1
@@ -63,7 +63,7 @@ class Discontinuities:
     visible_step: float = 3.0  # noise units: from it on a step may be a jump; chosen
     deciding_jump: float = 5.0  # noise units: from it on a known jump between two samples decides a fit; chosen
     large_jump: float = 50.0  # noise units: larger jumps have no instant that is right to the sample; chosen
-    neighbours: int = 3  # samples to either side, between whose values one beside a jump may lie; chosen
+    samples_to_side: int = 3  # samples to either side, between whose values one beside a jump may lie; chosen
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,16 +82,16 @@ class Drop:
     longest_step: float = 2e-3  # s: time step of a drop; within 6e-5 of a channel's range
     abrupt_step: float = 1e-3  # s: time step with abrupt effects; within 8e-4 of a channel's range where it oscillates
     track_margin: float = 0.02  # s: a drop is simulated longer by it, since clocks are moved; chosen
-    kept_predictions: int = 128  # kept predictions of one recording; chosen
-    kept_tracks: int = 16  # kept drops of one recording; chosen
-    kept_scenarios: int = 64  # kept scenarios under conditions, of more recordings than are fitted at once; chosen
+    cached_predictions: int = 128  # kept predictions of one recording; chosen
+    cached_tracks: int = 16  # kept drops of one recording; chosen
+    cached_scenarios: int = 64  # kept scenarios under conditions, of more recordings than are fitted at once; chosen
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
     """Simulated full runs."""
 
-    kept_runs: int = 600  # kept runs of one recording; a third of a megabyte each
+    cached_runs: int = 600  # kept runs of one recording; a third of a megabyte each
     filter_ahead: float = 0.06  # s: a filter sees beyond the last stamp where the recording went on; chosen
     slowest_ratio: float = 20.0  # ratio to the first run's wall time: a slower run is stopped; chosen
     least_wall_time: float = 2.0  # s of wall time: no run is stopped before; chosen

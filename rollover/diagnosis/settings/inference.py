@@ -87,7 +87,7 @@ class Intervals:
     end_error: float = 1e-3  # share of such an end: half width of its interval; chosen
     least_rise: float = 0.4  # share of the due rise of the misfit; chosen
     # rise of the misfit that is no chance; misfits of means of runs scatter by 3 (1 sd) from place to place
-    rough_rise: float = 8.0
+    model_error_rise: float = 8.0
     # factors of the half width at which one looks behind a rise; chosen
     scan_factors: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
     widen_above: float = 1.2  # factor: below it an interval that is too narrow is chance; chosen
@@ -119,7 +119,7 @@ class LocalQuadratic:
     # 1997)
     clear_slope: float = 10.0
     some_slope: float = 1.0  # the same ratio: a slope is determined at all; chosen
-    least_places: int = 6  # places that determine a slope; chosen
+    least_points: int = 6  # places that determine a slope; chosen
     same_slope: float = 0.8  # share of the slope at the fit: from it on the mean's is the same; chosen
     normal_quantile: float = 1.96  # two-sided 95 % quantile of the standard normal distribution; definition
     # ratio to the rise that slopes predict: above it, and `outlier_rise`, a run took another course; chosen

@@ -37,7 +37,7 @@ class Autoregression:
 class Drift:
     """Drift of a channel."""
 
-    approach_terms: int = 5  # cosines of a stretch, the first of them its mean; chosen
+    drift_terms: int = 5  # cosines of a stretch, the first of them its mean; chosen
     contact_terms: int = 8  # cosines of all that follows the contact; chosen
     least_samples: int = 24  # samples of an approach; chosen
     least_recordings: int = 3  # recordings that show what they share; chosen
@@ -59,11 +59,11 @@ class Ensemble:
     full_weight: float = 0.99  # weight: channels above it everywhere are not reweighted; chosen
     state_size: int = 14  # numbers (d): dimension of the vehicle's state; position and velocity of a body, and an axle
     least_channels: int = 3  # channels: with fewer none is distinguished from another course; chosen
-    other_course: float = 0.5  # share of a recording's full weight: below it the recording took another course; chosen
-    other_course_rate: float = 0.15  # probability of another course for one recording; chosen
-    other_course_p_value: float = 0.02  # p-value of the number of other courses: below it they are no chance; chosen
-    least_neighbours: int = 2  # neighbours that show how far one more may go; chosen
-    outlier_power: float = 9.0  # ratio to the neighbours' median power: beyond it one took another course; chosen
+    diverged_share: float = 0.5  # share of a recording's full weight: below it the recording has diverged; chosen
+    divergence_rate: float = 0.15  # probability that one recording diverges from its run; chosen
+    divergence_p_value: float = 0.02  # p-value of the number that diverged: below it that is no chance; chosen
+    least_perturbed: int = 2  # perturbed runs that show how far one more may go; chosen
+    outlier_power: float = 9.0  # ratio to the median power of perturbed runs: beyond it one has diverged; chosen
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +105,7 @@ class Outliers:
     median_width: int = 13  # samples of the running median; chosen
     # ratio to the usual distance from the median: beyond it a sample is in a burst; chosen
     outlier_distance: float = 5.0
-    burst_ratio: float = 1.5  # ratio to the noise beside bursts: above it bursts are no noise; chosen
+    outlier_ratio: float = 1.5  # ratio to the noise beside bursts: above it bursts are no noise; chosen
     least_clean_share: float = 0.7  # share of the samples beside bursts; chosen
     outlier_rate: float = 0.01  # share of a channel's samples that may be outliers of any noise; chosen
 
@@ -128,7 +128,7 @@ class SpectralLines:
 class Truncation:
     """End of a recording that is left out."""
 
-    kept_after_impact: float = 0.6  # s after the impact that are always kept; chosen
+    retained_after_impact: float = 0.6  # s after the impact that are always kept; chosen
     least_cut: float = 0.1  # s: a shorter end is not cut off; chosen
     least_weight: float = 0.3  # share of full weight on average: from it on the end is kept; chosen
     least_misfit: float = 3.0  # ratio to what noise and scatter leave: an end that is missed by more is kept; chosen

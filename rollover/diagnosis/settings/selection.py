@@ -18,7 +18,7 @@ class Candidates:
 class Decision:
     """Decision on an explanation."""
 
-    look_share: float = 0.05  # share of all errors for the look at candidates, where runs scatter; chosen
+    scan_share: float = 0.05  # share of all errors for the look at candidates, where runs scatter; chosen
     largest_p_value: float = 1.0 - 1e-12  # p-value: largest whose logarithm is taken; chosen
     # share of the excess misfit, were it structured, that one named effect may leave; chosen
     left_structure: float = 0.005
@@ -39,7 +39,7 @@ class EnsembleValidation:
     shared_gain: float = 9.0  # the same that all recordings but the best must bring together; chosen
     # ratio to a linear interval: a strength beyond it differs from zero without further runs; chosen
     sure_width: float = 4.0
-    needed_width: float = 10.0  # ratio to a linear interval: an effect beyond it is needed; chosen
+    retained_width: float = 10.0  # ratio to a linear interval: an effect beyond it is needed; chosen
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +59,7 @@ class ForwardStep:
     rival_share: float = 0.4
     least_score: float = 0.05  # share of the best score: below it none is fitted where fits cost much; chosen
     polished_misfit: float = 100.0  # ratio to the best misfit: up to it a fit of two parameters is polished; chosen
-    roughness: float = 0.002  # share of the misfit that is arithmetic; chosen
+    arithmetic_share: float = 0.002  # share of the misfit that is arithmetic; chosen
     simpler_errors: float = 1.0  # standard errors within which the simpler one is preferred; chosen
     excluded_errors: float = 2.0  # standard errors beyond which a rival is excluded; chosen
     same_misfit: float = 0.3  # sum of squares over the noise: fits no further apart are one and the same; chosen
@@ -134,7 +134,7 @@ class ScoreTest:
     visible: float = 5.0  # standard errors of the noise at which an effect shows; chosen
     jitter: float = 1e-9  # added to a correlation matrix's diagonal, per row; chosen
     ways: int = 2  # places of one effect at which fits begin; chosen
-    close_places: int = 8  # places of one effect that are looked at closely; chosen
+    close_points: int = 8  # places of one effect that are looked at closely; chosen
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,7 +174,7 @@ class Stepwise:
     # first; chosen
     no_third_above: float = 3.0
     # recordings on another course that are forgiven although a candidate scores beyond chance, one fewer; chosen
-    most_other_courses: int = 2
+    most_diverged: int = 2
     # share of the first excess misfit that two effects leave: above it no exchange of one helps; chosen
     hopeless_share: float = 0.7
     hopeless: float = 2.0  # misfit over the noise: above it much is left; chosen
@@ -189,7 +189,7 @@ class TruncatedStart:
     filter_ahead: float = 0.05  # s that are simulated after an end, for filters that look ahead; chosen
     rivals: int = 5  # rivals held against the best over the whole way; chosen
     # ratios to the time of the deepest point: ends after it, before a rebound ends; chosen
-    later_ends: tuple[float, ...] = (1.2, 2.0)
+    later_truncations: tuple[float, ...] = (1.2, 2.0)
     rest: float = 1.2  # ratio to the time of the deepest point: from it on the way back begins; chosen
     deepest: float = 0.999  # share of the largest depth that counts as deepest; chosen
     # share of the excess misfit that must change there for the way back to be a reason; chosen
