@@ -128,7 +128,7 @@ def diagnose(
         if found.verdict == "unexplained" and unexplained is not None:
             found = _second_opinion(unexplained, usable, notes) or found
     bounds = stated or (dict.fromkeys(channels, general) if general > 0.0 else {})
-    is_open = found.verdict == "unexplained" or is_hardly_tolerated(found)
+    is_open = (found.verdict == "unexplained" and not found.by_itself) or is_hardly_tolerated(found)
     if estimate and not reference and bounds and is_open and not unfit(scenario):
         used = {e.name for e in usable}
         exact = without_inconsistent([e for e in exact if e.name in used], inconsistent)
