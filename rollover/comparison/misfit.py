@@ -27,6 +27,7 @@ from rollover.spec.vehicle import Striker, Vehicle, chassis_of
 
 Array = NDArray[np.float64]
 
+SURE = 1.96  # standard deviations beyond which an offset is one, with 95 %
 CLOCK_WINDOW = 0.02  # s, to either side, in which the clock's offset is looked for
 NOISE_SAMPLES = 100_000  # the first of a channel, by which its noise is estimated
 CLOCK_SAMPLES = 50_000  # of each channel, by which it is found
@@ -86,6 +87,16 @@ class Clock:
     sigma: float
     gain: float
     at_limit: bool
+
+    @property
+    def sentence(self) -> str:
+        """What there is to be said of it: how far it is off, or within what it agrees (95 %)."""
+        late, sigma = 1e3 * self.offset, 1e3 * self.sigma
+        if abs(late) < SURE * sigma and not self.at_limit:
+            return f"its clock agrees with the simulation's within {SURE * sigma:.2g} ms"
+        way = "late" if late >= 0.0 else "early"
+        would = f"setting it, which was not done, would remove {self.gain:.0%} of the squared residual"
+        return f"its clock is {abs(late):.3g} +- {sigma:.2g} ms {way}; {would}"
 
 
 @dataclass(frozen=True, kw_only=True)

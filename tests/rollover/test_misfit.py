@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rollover.comparison import alignment
-from rollover.comparison.misfit import Misfit, contact, estimated_noise, misfit
+from rollover.comparison.misfit import Clock, Misfit, contact, estimated_noise, misfit
 from rollover.comparison.rating import Rating
 from rollover.dynamics.result import Event, Run
 from rollover.recording import Recording, Sensor
@@ -221,3 +221,12 @@ def test_noise_is_found_in_the_recording_itself() -> None:
     made = replace(recorded(scene(), {}, np.random.default_rng(6), every=1), noise={})
     for channel, sigma in NOISE.items():
         assert estimated_noise(made, channel) == pytest.approx(sigma, rel=0.15)
+
+
+def test_a_clock_within_its_error_agrees() -> None:
+    sure = Clock(offset=2.5e-3, sigma=1e-3, gain=0.3, at_limit=False)
+    way = "setting it, which was not done, would remove 30% of the squared residual"
+    assert sure.sentence == f"its clock is 2.5 +- 1 ms late; {way}"
+    assert replace(sure, offset=-2.5e-3).sentence == f"its clock is 2.5 +- 1 ms early; {way}"
+    assert replace(sure, offset=1.7e-17).sentence == "its clock agrees with the simulation's within 2 ms"
+    assert "late" in replace(sure, offset=1e-5, at_limit=True).sentence, "no agreement where the search ended"

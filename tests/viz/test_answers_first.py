@@ -112,3 +112,11 @@ def test_a_known_noise_is_a_band_in_the_viewer(drop: Run, tmp_path: Path) -> Non
     assert not any("Measurements" in name for name in read_entities(tmp_path / "b.rrd")[here])
     _, bare = read_column(tmp_path / "b.rrd", here, "Scalars:scalars")
     assert np.array(bare, dtype=float) == pytest.approx(np.array(values, dtype=float))
+
+
+def test_a_headline_of_one_channel_is_no_span(drop: Run) -> None:
+    one = comparison.headline([compared(drop)])
+    assert re.fullmatch(r"1 recording, 1 channel: ISO/TS 18571 0\.\d\d \(\w+\)\.", one.sentence)
+    assert re.match(r"Residuals are [\d.]+ times the noise\.", one.detail)
+    two = comparison.headline([compared(drop), compared(drop, 1.3)])
+    assert re.fullmatch(r"2 recordings, 2 channels: ISO/TS 18571 0\.\d\d \(\w+\) to 0\.\d\d \(\w+\)\.", two.sentence)

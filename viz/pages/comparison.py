@@ -59,8 +59,8 @@ def headline(found: Sequence[Misfit]) -> Headline:
         key=lambda iso: iso.overall,
     )
     noisy = sorted(r.over_noise for r in ratings if isinstance(r, Rating) and r.over_noise is not None)
-    recordings = f"{len(found)} recording{'s' if len(found) != 1 else ''}, {len(ratings)} channels"
-    detail = f"Residuals are {noisy[0]:.3g} to {noisy[-1]:.3g} times the noise." if noisy else ""
+    recordings = f"{len(found)} recording{'s'[: len(found) != 1]}, {len(ratings)} channel{'s'[: len(ratings) != 1]}"
+    detail = f"Residuals are {_span(*(f'{v:.3g}' for v in (noisy[0], noisy[-1])))} times the noise." if noisy else ""
     state: State = "warn"
     if worst := [verdict(r) for r in ratings if isinstance(r, Rating)]:
         judged = worst_verdict(worst)
@@ -72,12 +72,13 @@ def headline(found: Sequence[Misfit]) -> Headline:
             detail=detail,
             state="fail" if state == "fail" else "warn",
         )
-    low, high = isos[0], isos[-1]
-    return Headline(
-        sentence=f"{recordings}: ISO/TS 18571 {low.overall:.2f} ({low.grade}) to {high.overall:.2f} ({high.grade}).",
-        detail=detail,
-        state=state,
-    )
+    span = _span(*(f"{iso.overall:.2f} ({iso.grade})" for iso in (isos[0], isos[-1])))
+    return Headline(sentence=f"{recordings}: ISO/TS 18571 {span}.", detail=detail, state=state)
+
+
+def _span(low: str, high: str) -> str:
+    """From the least to the largest, or the one that both are."""
+    return low if low == high else f"{low} to {high}"
 
 
 def _recording(found: Misfit) -> list[Block]:

@@ -110,13 +110,8 @@ def sentences(found: Misfit) -> list[str]:
             f"first contact: measured {_instant(found.contact_measured)}, simulated {_instant(found.contact_simulated)}"
         )
     if found.clock is not None:
-        c = found.clock
-        way = "late" if c.offset >= 0.0 else "early"
-        lines.append(
-            f"the recording's clock agrees best when taken {1e3 * abs(c.offset):.3g} +- {1e3 * c.sigma:.2g} ms {way}; "
-            f"setting it, which was not done, would remove {100.0 * c.gain:.0f} % of the squared residual"
-        )
-        if c.at_limit:
+        lines.append(found.clock.sentence)
+        if found.clock.at_limit:
             lines.append("that is the end of the window that was searched: the clocks may be further apart")
     if found.energy_measured is not None and found.energy_simulated is not None:
         lines.append(

@@ -64,11 +64,8 @@ def comparison(found: Sequence[Misfit], folder: str) -> None:
         if each.zero is not None:
             out.print(f"{each.zero.sentence[0].upper()}{each.zero.sentence[1:]}: set to it.", style="yellow")
         if each.clock is not None:
-            late, sigma, gain = 1e3 * each.clock.offset, 1e3 * each.clock.sigma, 100.0 * each.clock.gain
-            way = "late" if late >= 0.0 else "early"
-            out.print(
-                f"Clock {abs(late):.3g} +- {sigma:.2g} ms {way}; setting it (not done) would remove {gain:.0f} %."
-            )
+            said = each.clock.sentence
+            out.print(f"{said[0].upper()}{said[1:]}.")
         for channel, why in each.skipped.items():
             out.print(f"{channel}: left out, {why}", style="yellow")
         for note in each.notes:
