@@ -280,7 +280,7 @@ def _judged(load: Push, entry: Mapping[str, Any], requirement: Any) -> Criterion
     note = f"load {load.name!r} {entry['status']}"
     if "deflection" in entry:
         note += f" at {1e3 * entry['deflection']:.0f} mm and {1e-3 * entry['force']:.1f} kN"
-        note += f", {round(1e3 * entry['permanent_set']) + 0:d} mm left"
+        note += f", {round(1e3 * entry['permanent_set']) + 0:d} mm permanent set"
     if (entered := entry.get("entered")) is not None:
         note += f"; a member entered the clearance zone at {1e3 * entered['deflection']:.0f} mm"
         return judged(requirement, min(simulated, entered[requirement.quantity]), note)

@@ -71,7 +71,7 @@ def _load(
     if "deflection" in entry:
         note += f" at {1e3 * entry['deflection']:.0f} mm and {1e-3 * entry['force']:.1f} kN"
     if "permanent_set" in entry:
-        note += f", {round(1e3 * entry['permanent_set']) + 0:d} mm left"
+        note += f", {round(1e3 * entry['permanent_set']) + 0:d} mm permanent set"
     if requirement.quantity == "force" and done:
         assert isinstance(run.scenario.initiation, StaticTest)
         note += f"; held {run.scenario.initiation.hold:g} s after the deflection stopped, the test holds {HELD:g} s"
