@@ -114,7 +114,7 @@ def _unknown(at: str, name: Name, given: Sealed) -> Iterator[tuple[str, str]]:
         if id not in given.candidates:
             yield at, f"no such candidate, got {id!r}; {hint(id, given.candidates)}"
             return
-    own = given.candidates[name.id].get("parameters", {})
+    own = given.candidates[name.id]
     for parameter in name.parameters:
         if parameter not in own:
             yield f"{at}.parameters", f"none of {name.id}, got {parameter!r}; {hint(str(parameter), own)}"

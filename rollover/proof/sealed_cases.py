@@ -49,12 +49,15 @@ def export(
 
 @dataclass(frozen=True, kw_only=True)
 class Sealed:
-    """A folder of sealed cases: names of the cases with their fingerprints, the truth's digest, what may be named."""
+    """A folder of sealed cases: names of the cases with their fingerprints, the truth's digest, what may be named.
+
+    `candidates` are the names of the parameters that each has, by its id.
+    """
 
     folder: Path
     seal: dict[str, Any]
     cases: dict[str, str]
-    candidates: dict[str, dict[str, Any]]
+    candidates: dict[str, tuple[str, ...]]
 
     @property
     def digest(self) -> str:
@@ -69,9 +72,12 @@ def read_sealed(folder: Path) -> Sealed:
     candidates = _read(folder / CANDIDATES, CANDIDATES_FORMAT, "candidates")
     try:
         cases = {str(c["case"]): str(c["sha256"]) for c in listed["cases"]}
-        known = {str(c["id"]): dict(c) for c in candidates["candidates"]}
     except (KeyError, TypeError, ValueError):
         raise _no_cases(folder / LIST, "its entries are not those of sealed cases") from None
+    try:
+        known = {str(c["id"]): tuple(map(str, dict(c["parameters"]))) for c in candidates["candidates"]}
+    except (KeyError, TypeError, ValueError):
+        raise _no_cases(folder / CANDIDATES, "its entries are not candidates with their parameters") from None
     for name, shown in cases.items():
         place = folder / name
         if Path(name).name != name or not place.is_dir():

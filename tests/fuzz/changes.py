@@ -297,9 +297,10 @@ def parquet(data: bytes, rng: Rng) -> bytes:
 
     try:
         whole = pq.read_table(io.BytesIO(data))
+        names = whole.column_names  # of bytes that are no text, where an earlier change met them
     except Exception:
         return raw(data, rng)
-    if not whole.column_names:
+    if not names:
         return raw(data, rng)
     metadata = dict(whole.schema.metadata or {})
     i = rng.randrange(len(whole.column_names))

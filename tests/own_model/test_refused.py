@@ -70,6 +70,7 @@ SIMULATES: dict[str, tuple[Callable[..., Any], str]] = {
     ),
     "a single number": (lambda self, time, inputs, values: {OUT: 1.0}, r"of shape \(\); \(400,\) is needed"),
     "words": (lambda self, time, inputs, values: {OUT: "much"}, "returned no numbers as"),
+    "complex numbers": (lambda self, time, inputs, values: {OUT: inputs[IN] * 1j}, "returned complex numbers as"),
     "not a number": (lambda self, time, inputs, values: {OUT: inputs[IN] * np.nan}, "no solution where fits begin"),
     "a division by zero": (lambda self, time, inputs, values: {OUT: inputs[IN] * (1 / 0)}, "no solution where fits"),
     "something else each time": (drifting, "not the same outputs for the same values twice"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import stat
 import sys
 from pathlib import Path
@@ -205,8 +206,6 @@ def test_all_cases_are_answered_and_of_this_seal(cases: Path, tmp_path: Path) ->
 
 
 def test_another_truth_and_changed_recordings_are_refused(cases: Path, tmp_path: Path) -> None:
-    import shutil
-
     answers = right(cases)
     truth = json.loads(truth_of(cases).read_text())
     truth["truths"][0]["verdict"] = "unexplained"
@@ -233,6 +232,18 @@ def test_another_truth_and_changed_recordings_are_refused(cases: Path, tmp_path:
     assert (done.exit_code, "case-0002: no sealed cases: its files are not those" in done.stderr) == (2, True)
     done = scored(tmp_path, answers, tmp_path / "d", "--truth", truth_of(cases))
     assert (done.exit_code, "no sealed cases: it is missing" in done.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("entry", [{"parameters": 3}, {"parameters": None}, {}, 7, "id"])
+def test_candidates_without_their_parameters_are_refused(cases: Path, tmp_path: Path, entry: Any) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(cases, copy)
+    listed = json.loads((copy / "candidates.json").read_text())
+    first = listed["candidates"][0]
+    listed["candidates"][0] = {"id": first["id"], **entry} if isinstance(entry, dict) else entry
+    (copy / "candidates.json").write_text(json.dumps(listed))
+    done = scored(copy, right(cases), tmp_path / "a", "--truth", truth_of(cases))
+    assert (done.exit_code, "candidates.json: no sealed cases: its entries are not" in done.stderr) == (2, True)
 
 
 def test_the_folder_one_is_in_has_its_truth_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -221,7 +221,7 @@ def test_no_number_and_no_heading_is_broken_on_paper(kind: str, pages: dict[str,
 @needs_browser
 def test_a_table_of_long_words_leaves_numbers_and_headings_whole(browser: Any, tmp_path: Path) -> None:
     words = (
-        "load 'crush-rear' reached at 2 mm and 60.0 kN, 0 mm permanent set, of what the sequence asks of a tractor of this mass"
+        "load 'crush-rear' reached at 2 mm and 60.0 kN, 0 mm permanent set, of what the sequence asks of such a tractor"
     )
     rows = [[f"OECD Code 4: {words}", "43.5 kN", "1234.567 kN", "impact-speed, momentum", words, "2.836", "14.79"]] * 2
     heads = ("requirement", "asked", "simulated", "verdict", "how", "at, s", "CFC 60")

@@ -104,7 +104,11 @@ class ModelSimulator:
                 yield f"simulate returned no {name}, got {got}; each output is needed"
                 continue
             try:
-                values = np.asarray(made[name], dtype=np.float64)
+                values = np.asarray(made[name])
+                if np.iscomplexobj(values):  # as a power of a negative number is
+                    yield f"simulate returned complex numbers as {name}; real ones are needed"
+                    continue
+                values = np.asarray(values, dtype=np.float64)
             except (TypeError, ValueError):
                 yield f"simulate returned no numbers as {name}, got {made[name]!r}; floats are needed"
                 continue
