@@ -16,6 +16,7 @@ _PEAK = {
     **dict.fromkeys(("raw", "raw_time", "filtered", "filtered_time"), NUMBER),
     **dict.fromkeys(("impulse", "half_step_change", "mean", "scatter"), (NUMBER,)),
     "starts": (COUNT,),
+    "starts_by": (TEXT,),
 }
 ANSWER: Mapping[str, Any] = {
     **dict.fromkeys(("title", "status", "sentence", "scenario_hash"), TEXT),

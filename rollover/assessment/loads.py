@@ -34,9 +34,9 @@ class PeakLoad:
     filtered: float
     filtered_time: float
     cfc: int
-    impulse: float | None
+    impulse: float | None = None
     domain_flags: tuple[str, ...]
-    half_step_change: float | None
+    half_step_change: float | None = None
     starts: int | None = None
     mean: float | None = None
     scatter: float | None = None

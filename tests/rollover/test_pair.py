@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
+import shutil
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +111,23 @@ def test_a_folder_that_is_not_whole_is_refused(folders: tuple[Path, Path], tmp_p
     (tmp_path / "run.json").write_text((folders[0] / "run.json").read_text())
     with pytest.raises(InputError, match=r"no scenario.yaml there; run it again"):
         read(tmp_path)
+
+
+def test_what_older_versions_did_not_write_of_a_load_is_unknown(folders: tuple[Path, Path], tmp_path: Path) -> None:
+    shutil.copytree(folders[0], tmp_path / "old")
+    file = tmp_path / "old" / "run.json"
+    answer = json.loads(file.read_text())
+    may_be_none = [f.name for f in fields(PeakLoad) if f.default is None]
+    assert {"half_step_change", "impulse", "mean", "starts_by"} <= set(may_be_none)
+    answer["peak_loads"] = [{k: v for k, v in p.items() if k not in may_be_none} for p in answer["peak_loads"]]
+    file.write_text(json.dumps(answer))
+    old = read(tmp_path / "old")
+    assert [(p.half_step_change, p.impulse) for p in old.peaks] == [(None, None)] * 3
+    assert pair(old, read(folders[1])).loads
+    answer["peak_loads"][0]["starts_by"] = 3
+    file.write_text(json.dumps(answer))
+    with pytest.raises(InputError, match="starts_by: not text, got 3"):
+        read(tmp_path / "old")
 
 
 def test_the_command(folders: tuple[Path, Path], tmp_path: Path) -> None:
