@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rollover.comparison import alignment
 from rollover.comparison.alignment import Signal
+from rollover.comparison.clock_offset import Clock, clock
 from rollover.comparison.instruments import at_sensors
 from rollover.comparison.rating import NotRateable, Peak, Rating, rate
 from rollover.dynamics.result import Run
@@ -27,10 +28,7 @@ from rollover.spec.vehicle import Striker, Vehicle, chassis_of
 
 Array = NDArray[np.float64]
 
-SURE = 1.96  # standard deviations beyond which an offset is one, with 95 %
-CLOCK_WINDOW = 0.02  # s, to either side, in which the clock's offset is looked for
 NOISE_SAMPLES = 100_000  # the first of a channel, by which its noise is estimated
-CLOCK_SAMPLES = 50_000  # of each channel, by which it is found
 CONTACT_SHARE, CONTACT_SIGMAS, CONTACT_ROWS = 0.02, 5.0, 3  # of the peak, of the noise, in a row: contact
 OUTSIDE = 0.01  # of a recording's samples: more beyond the simulation are worth a note
 LEAD = 0.01  # s before first contact that are rated with what follows
@@ -73,30 +71,6 @@ class ChannelMisfit:
     def residual(self) -> Array:
         """Measured less simulated, (n,)."""
         return self.measured - self.simulated
-
-
-@dataclass(frozen=True, kw_only=True)
-class Clock:
-    """The recording's clock against the simulation's: `offset` s > 0 where the recording is late, with 1 sigma.
-
-    `gain` is the share of the squared residual over noise that setting the clock would remove; `at_limit`: the
-    window was too small.
-    """
-
-    offset: float
-    sigma: float
-    gain: float
-    at_limit: bool
-
-    @property
-    def sentence(self) -> str:
-        """What there is to be said of it: how far it is off, or within what it agrees (95 %)."""
-        late, sigma = 1e3 * self.offset, 1e3 * self.sigma
-        if abs(late) < SURE * sigma and not self.at_limit:
-            return f"its clock agrees with the simulation's within {SURE * sigma:.2g} ms"
-        way = "late" if late >= 0.0 else "early"
-        would = f"setting it, which was not done, would remove {self.gain:.0%} of the squared residual"
-        return f"its clock is {abs(late):.3g} +- {sigma:.2g} ms {way}; {would}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,48 +224,6 @@ def as_measured(scenario: Scenario, simulated: Recording, recording: Recording) 
         centre = chassis_of(vehicle).centre_of_mass
         pivot = vehicle.front_axle.pivot if vehicle.front_axle is not None else None
     return at_sensors(simulated, recording, centre_of_mass=centre, pivot=pivot, gravity=scenario.gravity)
-
-
-def clock(signals: Sequence[tuple[Signal, float]], simulated: Recording) -> Clock | None:
-    """Offset of the recording's clock at which its channels agree best with the simulation; scanned, then refined."""
-    if not signals:
-        return None
-    signals = [(_thinned(signal), sigma) for signal, sigma in signals]
-    smooth = [alignment.smooth(signal, simulated) for signal, _ in signals]
-
-    def squared(late: float) -> float:
-        return sum(
-            float(np.sum(((s.values - alignment.at_stamps(s, simulated.time, v, late=late)) / sigma) ** 2))
-            for (s, sigma), v in zip(signals, smooth, strict=True)
-        )
-
-    now = squared(0.0)
-    width, step = CLOCK_WINDOW, CLOCK_WINDOW / 20.0
-    centre = 0.0
-    while step > 1e-7:
-        at = centre + np.arange(-width, width + 0.5 * step, step)
-        at = at[np.abs(at) <= CLOCK_WINDOW * (1.0 + 1e-9)]
-        cost = np.array([squared(float(late)) for late in at])
-        centre, width, step = float(at[int(np.argmin(cost))]), step, step / 5.0
-    least = squared(centre)
-    count = sum(s.time.size for s, _ in signals)
-    near = 2e-4
-    bend = (squared(centre + near) - 2.0 * least + squared(centre - near)) / near**2
-    sigma = float(np.sqrt(2.0 / bend * max(1.0, least / count))) if bend > 0.0 else CLOCK_WINDOW
-    return Clock(
-        offset=centre,
-        sigma=min(sigma, CLOCK_WINDOW),
-        gain=1.0 - least / now if now > 0.0 else 0.0,
-        at_limit=abs(centre) > CLOCK_WINDOW * 0.999,
-    )
-
-
-def _thinned(signal: Signal) -> Signal:
-    """At most `CLOCK_SAMPLES` of a signal's samples, evenly taken; filtered as before."""
-    every = -(-signal.time.size // CLOCK_SAMPLES)
-    if every == 1:
-        return signal
-    return replace(signal, time=signal.time[::every], values=signal.values[::every], stretch=signal.stretch[::every])
 
 
 class _TooSlowError(ValueError):

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rollover.comparison import alignment
-from rollover.comparison.misfit import Clock, Misfit, contact, estimated_noise, misfit
+from rollover.comparison.clock_offset import Clock
+from rollover.comparison.misfit import Misfit, contact, estimated_noise, misfit
 from rollover.comparison.rating import Rating
 from rollover.dynamics.result import Event, Run
 from rollover.recording import Recording, Sensor
