@@ -20,26 +20,37 @@ from tests.fuzz.oracle import is_whole
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 
 
-def numbers() -> Iterator[tuple[str, str]]:
-    """Command and option of every number with a point that a command takes."""
+def numbers(kind: type) -> Iterator[tuple[str, str]]:
+    """Command and option of every number of a kind that a command takes."""
     for name, command in sorted(COMMANDS.items()):
         hints = get_type_hints(command.callback)
         for option in command.params:
-            if float in (hints[option.name], *get_args(hints[option.name])):
+            if kind in (hints[option.name], *get_args(hints[option.name])):
                 yield name, option.opts[0]
 
 
-NUMBERS = list(numbers())
+NUMBERS, WHOLE = list(numbers(float)), list(numbers(int))
 
 
 def test_there_are_such_options() -> None:
     assert {("synthesize", "--late"), ("identify", "--buoyancy"), ("study", "--memory-limit")} <= set(NUMBERS)
     assert len(NUMBERS) >= 9
+    assert {("compare", "--cfc"), ("prove", "--seed"), ("study", "--workers")} <= set(WHOLE)
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-inf", "1e300", "-1e300", "1e30", "NaN"])
 @pytest.mark.parametrize(("name", "option"), NUMBERS)
 def test_a_number_beyond_all_bounds_is_refused(name: str, option: str, value: str) -> None:
+    refused(name, option, value)
+
+
+@pytest.mark.parametrize("value", ["1" + "0" * 25, "-1" + "0" * 25, "9" * 400])
+@pytest.mark.parametrize(("name", "option"), WHOLE)
+def test_a_whole_number_beyond_all_bounds_is_refused(name: str, option: str, value: str) -> None:
+    refused(name, option, value)
+
+
+def refused(name: str, option: str, value: str) -> None:
     words = ["nothing" for p in COMMANDS[name].params if p.param_type_name == "argument" and p.required]
     required = [
         w for p in COMMANDS[name].params if p.param_type_name == "option" and p.required for w in (p.opts[0], "x")

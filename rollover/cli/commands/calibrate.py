@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.cli.commands.common import BROKE, AsJson, Force, Setting, answering, app, manual, scenario_with, settings
-from rollover.system.arguments import MOST_CLOCK
+from rollover.system.arguments import MOST_CLOCK, MOST_SEED, MOST_WORKERS
 from rollover.system.errors import InputError
 
 if TYPE_CHECKING:
@@ -54,15 +54,17 @@ def calibrate(
     clock_sigma: Annotated[
         float, typer.Option(help="Prior of each recording's clock offset, s.", min=0.0, max=MOST_CLOCK)
     ] = 1e-3,
-    starts: Annotated[int, typer.Option(help="Random starts that are screened.", min=0)] = 8,
-    seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
+    starts: Annotated[int, typer.Option(help="Random starts that are screened.", min=0, max=100_000)] = 8,
+    seed: Annotated[int, typer.Option(help="Of the random starts.", min=0, max=MOST_SEED)] = 0,
     posterior: Annotated[
         bool, typer.Option("--posterior/--no-posterior", help="Sample what the recordings leave open of the values.")
     ] = False,
     draws: Annotated[int, typer.Option(help="Samples of the posterior.", min=500, max=1_000_000)] = 3000,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/calibrate/NAME")] = None,
-    workers: Annotated[int, typer.Option(help="Starts followed at once; 0 for this process.", min=0)] = 0,
+    workers: Annotated[
+        int, typer.Option(help="Starts followed at once; 0 for this process.", min=0, max=MOST_WORKERS)
+    ] = 0,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:

@@ -22,6 +22,7 @@ from rollover.cli.commands.common import (
     manual,
     scenario_with,
 )
+from rollover.recording.record import CLASSES
 from rollover.system.errors import THERE, Fault, InputError, absent, cured
 
 if TYPE_CHECKING:
@@ -63,7 +64,10 @@ def compare(
     cfc: Annotated[
         int | None,
         typer.Option(
-            help="Filter class for both sides, refused where one is too slow", show_default="loads.cfc if possible"
+            help="Filter class for both sides, refused where one is too slow",
+            show_default="loads.cfc if possible",
+            min=CLASSES[0],
+            max=CLASSES[-1],
         ),
     ] = None,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,

@@ -20,6 +20,7 @@ from rollover.cli.commands.common import (
     number_by_channel,
     scenario_with,
 )
+from rollover.system.arguments import MOST_WORKERS
 from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -106,7 +107,12 @@ def diagnose(
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
     workers: Annotated[
         int | None,
-        typer.Option(help="Processes that fit at once; the answer is the same.", show_default="number of cores", min=0),
+        typer.Option(
+            help="Processes that fit at once; the answer is the same.",
+            show_default="number of cores",
+            min=0,
+            max=MOST_WORKERS,
+        ),
     ] = None,
     force: Force = False,
     as_json: AsJson = False,

@@ -10,7 +10,7 @@ import typer
 
 from rollover.cli.commands.common import FAILED, AsJson, Force, answering, app, manual
 from rollover.cli.commands.sealing import Order, write_sealed_cases
-from rollover.system.arguments import LONGEST
+from rollover.system.arguments import LONGEST, MOST_CASES, MOST_SEED, MOST_WORKERS
 from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -30,13 +30,14 @@ ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES, PAGE)
 )
 @answering
 def prove(
-    cases: Annotated[int, typer.Option(help="How many concealed campaigns of tests.", min=1)] = 50,
+    cases: Annotated[int, typer.Option(help="How many concealed campaigns of tests.", min=1, max=MOST_CASES)] = 50,
     seed: Annotated[
         int | None,
         typer.Option(
             help="Another seed, other cases; the same seed, the same ones.",
             show_default="1; with --export one that nobody knows",
             min=0,
+            max=MOST_SEED,
         ),
     ] = None,
     export: Annotated[
@@ -47,7 +48,9 @@ def prove(
         Path | None, typer.Option(metavar="FILE", help="Of --export: the truth.", show_default="DIR-truth.json")
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder of the full report.")] = Path("out/prove"),
-    workers: Annotated[int | None, typer.Option(help="Cases at once", show_default="number of cores", min=0)] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Cases at once", show_default="number of cores", min=0, max=MOST_WORKERS)
+    ] = None,
     rig: Annotated[
         str | None,
         typer.Option(

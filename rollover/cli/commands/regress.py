@@ -23,7 +23,7 @@ from rollover.cli.commands.common import (
     app,
     manual,
 )
-from rollover.system.arguments import LONGEST
+from rollover.system.arguments import LONGEST, MOST_WORKERS
 from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -47,7 +47,9 @@ def regress(
     update: Annotated[bool, typer.Option("--update", help="Write the baselines anew; needs --reason.")] = False,
     reason: Annotated[str, typer.Option(help="Why the loads may be others from now on; kept in the baseline.")] = "",
     out: Annotated[Path, typer.Option(help="Folder of the full report.")] = Path("out/regress"),
-    workers: Annotated[int | None, typer.Option(help="Runs at once", show_default="number of cores", min=0)] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Runs at once", show_default="number of cores", min=0, max=MOST_WORKERS)
+    ] = None,
     time_limit: Annotated[float, typer.Option(help="Wall time for each run, s.", min=1.0, max=LONGEST)] = 600.0,
     force: Force = False,
     as_json: AsJson = False,

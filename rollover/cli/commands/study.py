@@ -21,7 +21,7 @@ from rollover.cli.commands.common import (
     manual,
     settings,
 )
-from rollover.system.arguments import LONGEST, MOST_MEMORY
+from rollover.system.arguments import LONGEST, MOST_MEMORY, MOST_WORKERS
 
 if TYPE_CHECKING:
     from rollover.studies.runner import Conducted
@@ -47,7 +47,8 @@ def study(
     set_: Setting = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/study/NAME")] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Cases at once; 0 for this process", show_default="number of cores", min=0)
+        int | None,
+        typer.Option(help="Cases at once; 0 for this process", show_default="number of cores", min=0, max=MOST_WORKERS),
     ] = None,
     scheduler: Annotated[
         str, typer.Option(metavar="ADDRESS", help="Of a dask scheduler: tcp://HOST:PORT, local or slurm.")

@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 from rollover.cli.commands.common import BROKE, FAILED, AsJson, Force, Setting, answering, app, manual, noises, settings
-from rollover.system.arguments import MOST_LATE
+from rollover.recording.record import CLASSES
+from rollover.system.arguments import MOST_LATE, MOST_SEED
 
 
 @app.command(
@@ -44,11 +45,15 @@ def synthesize(
         ),
     ] = None,
     rate: Annotated[float, typer.Option(help="Sampling rate, Hz.", min=1.0, max=1e6)] = 1000.0,
-    cfc: Annotated[int | None, typer.Option(help="Filter class that the instruments apply.")] = None,
+    cfc: Annotated[
+        int | None, typer.Option(help="Filter class that the instruments apply.", min=CLASSES[0], max=CLASSES[-1])
+    ] = None,
     late: Annotated[
         float, typer.Option(help="How late the instruments' clock is, s.", min=-MOST_LATE, max=MOST_LATE)
     ] = 0.0,
-    seed: Annotated[int | None, typer.Option(help="Of the noise", min=0, show_default="another for each name")] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Of the noise", min=0, max=MOST_SEED, show_default="another for each name")
+    ] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
