@@ -13,6 +13,7 @@ MOST_CLOCK = 1e3  # s: no recording of a rollover or a drop lasts so long, and n
 MOST_FORCE = 1e6  # N: the weight of 100 t, more than any striker's
 LEAST_DEPTH, MOST_DEPTH = 1e-4, 10.0  # m: a grain of sand, and what no striker of a drop test goes down to
 LONGEST = 1e7  # s: 116 days of wall time
+LEAST_CFC, MOST_CFC = 60, 1000  # of the filter classes; here, where no numpy is needed to know them
 MOST_WORKERS = 1024  # processes: more than the cores of any one machine
 MOST_SEED = 2**63 - 1  # what every generator takes
 MOST_CASES = 1_000_000  # of a campaign: a year at 30 s each

@@ -94,6 +94,13 @@ def test_an_import_loads_nothing_heavy() -> None:
     assert not [name for name in done.stdout.split() if name.startswith("rollover.") and ".system" not in name]
 
 
+def test_a_command_line_that_runs_nothing_loads_nothing_heavy() -> None:
+    code = "import sys, rollover.cli.main; print(' '.join(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name.partition(".")[0] for name in done.stdout.split()}
+    assert loaded.isdisjoint({"numpy", "scipy", "pyarrow", "exudyn", "numba", "pandas", "rerun"})
+
+
 def test_dir_shows_the_api_and_nothing_else() -> None:
     names = dir(ro)
     assert {"load", "run", "read", "compare", "calibrate", "identify", "diagnose", "study", "regress"} <= {*names}

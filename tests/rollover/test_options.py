@@ -14,6 +14,8 @@ import rollover as ro
 from rollover.cli.main import app
 from rollover.comparison.synthesis import check_clock
 from rollover.recording import Recording
+from rollover.recording.record import CLASSES
+from rollover.system.arguments import LEAST_CFC, MOST_CFC
 from rollover.system.errors import InputError
 from tests.fuzz.oracle import is_whole
 
@@ -61,6 +63,10 @@ def refused(name: str, option: str, value: str) -> None:
     assert f"'{option}'" in line
     assert is_whole(line) == ""
     assert "np.float" not in line
+
+
+def test_filter_classes_of_options_are_those_of_recordings() -> None:
+    assert (min(CLASSES), max(CLASSES)) == (LEAST_CFC, MOST_CFC)
 
 
 @pytest.mark.parametrize(("rate", "late"), [(1e6, 1e10), (1e6, -1e10), (1e3, 1e13)])

@@ -22,7 +22,7 @@ from rollover.cli.commands.common import (
     manual,
     scenario_with,
 )
-from rollover.recording.record import CLASSES
+from rollover.system.arguments import LEAST_CFC, MOST_CFC
 from rollover.system.errors import THERE, Fault, InputError, absent, cured
 
 if TYPE_CHECKING:
@@ -66,8 +66,8 @@ def compare(
         typer.Option(
             help="Filter class for both sides, refused where one is too slow",
             show_default="loads.cfc if possible",
-            min=CLASSES[0],
-            max=CLASSES[-1],
+            min=LEAST_CFC,
+            max=MOST_CFC,
         ),
     ] = None,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,

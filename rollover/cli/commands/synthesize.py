@@ -10,8 +10,7 @@ from typing import Annotated
 import typer
 
 from rollover.cli.commands.common import BROKE, FAILED, AsJson, Force, Setting, answering, app, manual, noises, settings
-from rollover.recording.record import CLASSES
-from rollover.system.arguments import MOST_LATE, MOST_SEED
+from rollover.system.arguments import LEAST_CFC, MOST_CFC, MOST_LATE, MOST_SEED
 
 
 @app.command(
@@ -46,7 +45,7 @@ def synthesize(
     ] = None,
     rate: Annotated[float, typer.Option(help="Sampling rate, Hz.", min=1.0, max=1e6)] = 1000.0,
     cfc: Annotated[
-        int | None, typer.Option(help="Filter class that the instruments apply.", min=CLASSES[0], max=CLASSES[-1])
+        int | None, typer.Option(help="Filter class that the instruments apply.", min=LEAST_CFC, max=MOST_CFC)
     ] = None,
     late: Annotated[
         float, typer.Option(help="How late the instruments' clock is, s.", min=-MOST_LATE, max=MOST_LATE)
