@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -112,8 +111,3 @@ class PendulumControl:
         """The blow, or that there was none."""
         missed = {"kind": "pendulum-blow", "name": f"from {self.blow.come_from}", "status": "not struck"}
         return (self.found or missed,)
-
-
-def speed_of_fall(blow: PendulumBlow, gravity: float) -> float:
-    """Speed sqrt(2 g H) of a block of no size at first contact, m/s."""
-    return math.sqrt(2.0 * gravity * blow.height)
