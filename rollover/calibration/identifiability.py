@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.calibration.objective import Objective
+from rollover.system.numbers import Z95
 
 Array = NDArray[np.float64]
 
-Z95 = 1.959963984540054
 AGREES = 0.10  # of Z95: a quadratic interval whose ends differ by more from the objective is replaced by a profile
 LEAVES = 0.80  # share of the allowed range that an interval leaves: as good as nothing was learnt
 WEAK = 0.25  # standard deviation of a direction, in ranges: its 95 % interval is as wide as the range

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.calibration.calibrate import Calibration, Estimate
-from rollover.calibration.identifiability import Z95
 from rollover.scenario import Scenario
+from rollover.system.numbers import Z95
 
 Array = NDArray[np.float64]
 K = TypeVar("K", bound=Hashable)

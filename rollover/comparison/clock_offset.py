@@ -10,8 +10,8 @@ import numpy as np
 from rollover.comparison import alignment
 from rollover.comparison.alignment import Signal
 from rollover.recording import Recording
+from rollover.system.numbers import Z95
 
-SURE = 1.96  # standard deviations beyond which an offset is one, with 95 %
 CLOCK_WINDOW = 0.02  # s, to either side, in which the clock's offset is looked for
 CLOCK_SAMPLES = 50_000  # of each channel, by which it is found
 
@@ -33,8 +33,8 @@ class Clock:
     def sentence(self) -> str:
         """What there is to be said of it: how far it is off, or within what it agrees (95 %)."""
         late, sigma = 1e3 * self.offset, 1e3 * self.sigma
-        if abs(late) < SURE * sigma and not self.at_limit:
-            return f"its clock agrees with the simulation's within {SURE * sigma:.2g} ms"
+        if abs(late) < Z95 * sigma and not self.at_limit:
+            return f"its clock agrees with the simulation's within {Z95 * sigma:.2g} ms"
         way = "late" if late >= 0.0 else "early"
         would = f"setting it, which was not done, would remove {self.gain:.0%} of the squared residual"
         return f"its clock is {abs(late):.3g} +- {sigma:.2g} ms {way}; {would}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+Z95 = 1.959963984540054  # standard normal quantile: 95 % lie within as many standard deviations
+
 
 def brief(value: float) -> str:
     """Two figures, whole where there are more of them before the point: 0.083, 8.3, 283; 8.3e-05 of what is tiny."""

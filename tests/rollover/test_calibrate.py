@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from rollover.calibration.calibrate import Calibration, calibrate
-from rollover.calibration.identifiability import Z95, determine
+from rollover.calibration.identifiability import determine
 from rollover.calibration.objective import Objective, Parameter, case, correlation_time, parameter
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 from rollover.system.errors import InputError
+from rollover.system.numbers import Z95
 from tests.rollover.twin import drop, recorded, scene
 
 STIFFNESS, MASS = "ground.law.stiffness_scale=0.3:3", "vehicle.mass=90:200"

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rollover.calibration.calibrate import Calibration
-from rollover.calibration.identifiability import Z95
 from rollover.calibration.prediction import prediction_error
+from rollover.system.numbers import Z95
 
 T = np.linspace(0.0, 2.0, 21)
 VALUES, SIGMA = {"a": 3.0, "b": -1.0}, {"a": 0.2, "b": 0.5}

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import pchip_interpolate
 
 from rollover.calibration.calibrate import Calibration, Estimate, Score
-from rollover.calibration.identifiability import Z95
 from rollover.calibration.posterior import Posterior
 from rollover.comparison.misfit import Misfit
+from rollover.system.numbers import Z95
 from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table, as_sentence
 from viz.content.differences import differences_section
 from viz.content.entities import series

@@ -40,7 +40,7 @@ def channel_of(key: str) -> str:
 
 
 def parted(e: Dataset) -> Dataset:
-    """The evidence with two signals for each channel, before the first impact and after it, each held against its own.
+    """The dataset with two signals for each channel, before the first impact and after it, each held against its own.
 
     As it is where the discrepancy is not known by these stretches, or one of them is too short.
     """

@@ -149,6 +149,6 @@ def correlation_times(problem: Problem, fitted: Fitted) -> dict[str, float]:
 
 
 def with_discrepancy(every: Sequence[Dataset], found: Discrepancy) -> list[Dataset]:
-    """The evidence with a discrepancy of these scales and correlation times by channel."""
+    """The datasets with a discrepancy of these scales and correlation times by channel."""
     scales, times = dict(found.scales), dict(found.times)
     return [replace(e, discrepancy=scales, memory=times, taught_by=found.taught_by) for e in every]

@@ -6,7 +6,7 @@ q common to all recordings, piecewise linear. Of a rate of turn also what has gr
 that acts. A quantity's share is what its function, fitted to all other conditions, takes from the excess of w'w over
 the noise where that condition is left out; a second one has what it adds to the first.
 
-Which force is missing is told by inverse dynamics of the difference between what the chassis' instruments read and what
+The missing force is found by inverse dynamics of the difference between what the chassis' instruments read and what
 the run says, in body axes, to the first order in that difference:
 
     dF = m (a - a_s),    dM = J d(omega - omega_s)/dt                                                          (D4)

@@ -332,7 +332,7 @@ def with_noise(s: Signal, noise: float, ar: tuple[float, ...], model_error: floa
 
 
 def with_own_model_error(e: Dataset) -> Dataset:
-    """The evidence with each part of a channel, where it has two, held against what the model may miss there."""
+    """The dataset with each part of a channel, where it has two, held against what the model may miss there."""
     if not any(s.phase for s in e.signals):
         return e
     return replace(e, signals=tuple(with_noise(s, s.noise, s.quiet[1], e.model_error_of(s)) for s in e.signals))
