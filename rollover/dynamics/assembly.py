@@ -17,9 +17,10 @@ from ground.surface import is_flat, normal
 from ground.surface import tables as surface_tables
 from rollover.dynamics.bodies import Body, bodies_of, nose_share
 from rollover.dynamics.links import link_rows
+from rollover.dynamics.post_rows import post_rows
 from rollover.dynamics.rows import joint_rows, mount_rows, term_rows, turning_rows, upright, wheel_rows
 from rollover.effects import acting
-from rollover.kernels import links, terms
+from rollover.kernels import links, posts, terms
 from rollover.kernels import tables as c
 from rollover.kernels.applied_forces import ACCOUNTS, HISTORY, coefficients
 from rollover.kernels.tables import Tables
@@ -59,6 +60,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     joint_i, joint_f, axle_f, axle_i = joint_rows(vehicle, bodies, row)
     term_i, term_f = term_rows(scenario, bodies)
     link_i, link_f, link_out = link_rows(scenario, bodies, row)
+    post_i, post_f, section_f = post_rows(None if isinstance(vehicle, Striker) else vehicle.rops)
     n = normal(ground.surface) if is_flat(ground.surface) else np.array([0.0, 0.0, 1.0])
     relief, nodes = surface_tables(ground.surface, ground.elements.spacing)
     nx, ny = ground.elements.count
@@ -168,6 +170,11 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         link_f=link_f,
         link_memory=np.zeros((len(link_i), links.LINK_MEMORY)),
         link_out=link_out,
+        post_i=post_i,
+        post_f=post_f,
+        post_memory=np.zeros((len(post_f), posts.POST_MEMORY)),
+        section_f=section_f,
+        section_memory=np.zeros((len(section_f), posts.SECTION_MEMORY)),
     )
 
 

@@ -13,6 +13,7 @@ from rollover.dynamics.bodies import Body
 from rollover.dynamics.links import link_channels
 from rollover.dynamics.prescribed import ground_acceleration, quantity, steered_kinetic
 from rollover.kernels import tables as c
+from rollover.kernels.posts import RECORDED
 from rollover.kernels.tables import OUT_COLUMNS, RESULTANT_COLUMNS, WORKS, Tables
 from rollover.kernels.time_loop import ROWS, Watch
 from rollover.scenario import Scenario
@@ -29,7 +30,7 @@ def row_length(t: Tables) -> int:
     n = len(t.spin_mass)
     out = OUT_COLUMNS if len(t.device_i) else 0
     parts = len(t.pose) * RESULTANT_COLUMNS + 10 * len(t.wheel_i) + 12 * len(t.mount_f)
-    return int(3 * n + parts + 2 + WORKS + 1 + 3 + len(t.input_i) + len(t.link_out) + out)
+    return int(3 * n + parts + 2 + WORKS + 1 + 3 + len(t.input_i) + len(t.link_out) + RECORDED * len(t.post_f) + out)
 
 
 @dataclass
@@ -89,6 +90,7 @@ class States:
     footprint: Array
     prescribed: Array  # (n, ni) what the inputs were
     links: Array  # (n, no) of an occupant, a hitch and struts, see rollover.dynamics.links
+    posts: Array  # (n, np, RECORDED) of posts that bend: plastic way of the head, plastic work, use
     device: Array  # (n, OUT_COLUMNS), or (n, 0) without a test stand
 
 
@@ -121,6 +123,7 @@ def states(rows: Array, t: Tables) -> States:
         footprint=take(),
         prescribed=take(len(t.input_i)),
         links=take(len(t.link_out)),
+        posts=take(len(t.post_f), RECORDED),
         device=rows[:, at:],
     )
 
@@ -262,6 +265,9 @@ def _rops(scenario: Scenario, s: States, bodies: tuple[Body, ...], row: dict[str
     found["rops/impulse"] = np.linalg.norm(resultant[:, c.R_IMPULSE : c.R_IMPULSE + 3], axis=1)
     found["rops/deflection"] = corner_deflection(vehicle.rops, s, bodies, row["chassis"], parts)
     found["rops/energy"] = s.work[:, c.ROPS]
+    for k, foot in enumerate(vehicle.rops.feet if s.posts.shape[1] else ()):
+        for j, name in enumerate(("set", "plastic_work", "use")):
+            found[f"rops/post/{foot.name}/{name}"] = s.posts[:, k, j]
     return found
 
 

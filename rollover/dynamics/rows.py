@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.dynamics.bodies import Body, loose
+from rollover.dynamics.post_rows import heads
 from rollover.dynamics.prescribed import first_angle
 from rollover.effects.vehicle import TankSlosh
 from rollover.kernels import tables as c
@@ -128,17 +129,16 @@ def mount_rows(
 ) -> tuple[Array, Index]:
     """Numbers and bodies of the mounts and hinges of a ROPS."""
     if isinstance(vehicle, Striker) or vehicle.rops is None:
-        return np.zeros((0, c.MOUNT_COLUMNS)), np.zeros((0, 2), dtype=np.int64)
-    rows, pairs = [], []
-    for joints, below, above in (
-        (vehicle.rops.standing, "chassis", "rops"),
-        (vehicle.rops.hinges, "rops", "rops_upper"),
-    ):
-        for joint in joints:
-            a, b, place = row[below], row[above], np.array(joint.position)
-            far = float(joint.turns_far)
-            rows.append([*(place - bodies[b].centre), *(place - bodies[a].centre), *joint.row, far])
-            pairs.append([a, b])
+        return np.zeros((0, c.MOUNT_COLUMNS)), np.zeros((0, 3), dtype=np.int64)
+    rows, pairs = list[list[float]](), list[list[int]]()
+    bends = heads(vehicle.rops)
+    for joint in vehicle.rops.joints:
+        a, b, k = row[joint.below], row[joint.above], len(rows) - len(vehicle.rops.mounts)
+        is_post = 0 <= k < len(bends)
+        place = np.array(bends[k] if is_post else joint.connector.position)
+        far = float(is_post or joint.connector.turns_far)
+        rows.append([*(place - bodies[b].centre), *(place - bodies[a].centre), *joint.connector.row, far])
+        pairs.append([a, b, k if is_post else -1])
     return np.array(rows), np.array(pairs, dtype=np.int64)
 
 

@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from ground.compiled import compiled, inlined, leaf
+from rollover.kernels.posts import ROOM_COLUMNS, ROOM_ROWS, try_post
+from rollover.kernels.rate import overstress
 from rollover.kernels.tables import (
     OMEGA,
     ROT,
@@ -76,22 +78,6 @@ def turned(turn: Any, beta: float, sign: float, x: Any, y: Any) -> None:
 
 
 @leaf
-def overstress(k: float, strength: float, speed: float, q: float, over: float, h: float) -> float:
-    """Relative overstress x = (w'/speed)^(1/q) of a step of length h whose elastic trial lies `over` the yield.
-
-    k h speed x^q + strength x = over: rising and convex, so that Newton's iteration from above never overshoots.
-    """
-    x = over / strength
-    for _ in range(60):
-        power = k * h * speed * x ** (q - 1.0)
-        change = (power * x + strength * x - over) / (q * power + strength)
-        x -= change
-        if change <= 1e-14 * x:
-            break
-    return max(x, 0.0)
-
-
-@leaf
 def try_axis(f: Any, g: Any, j: int, delta: float, rate: float, h: float) -> None:
     """Axis j of a connector at deflection `delta`: force on body b, with the set and plastic way it would leave."""
     k, gap, hardening = f[T_K + j], f[T_PLAY + j], f[T_HARD + j]
@@ -121,13 +107,14 @@ def try_axis(f: Any, g: Any, j: int, delta: float, rate: float, h: float) -> Non
 def try_mounts(t: Any, Q: Any) -> None:
     """Loads through mounts and hinges: on body b, and their reaction on body a at the same point."""
     room = np.empty((5, 3))
+    wide = np.empty((ROOM_ROWS if t.post_f.shape[0] > 0 else 0, ROOM_COLUMNS))
     for i in range(t.mount_f.shape[0]):
-        try_mount(t, i, room, Q)
+        try_mount(t, i, room, wide, Q)
 
 
 @leaf
-def try_mount(t: Any, i: int, room: Any, Q: Any) -> None:
-    """Loads through one of them; `room` (5, 3) is written over."""
+def try_mount(t: Any, i: int, room: Any, wide: Any, Q: Any) -> None:
+    """Loads through one of them; `room` (5, 3) is written over, of a post `wide` too."""
     local, torque, turn, rates, moved = room[0], room[1], room[2], room[3], room[4]
     h = t.clock[0]
     f, g = t.mount_f[i], t.mount_memory[i]
@@ -149,9 +136,15 @@ def try_mount(t: Any, i: int, room: Any, Q: Any) -> None:
         turned(turn, beta, -1.0, rates, moved)
         for k in range(3):
             rates[k] = moved[k]
+    if t.mount_i[i, 2] < 0:
+        for k in range(3):
+            try_axis(f, g, k, local[k] - f[T_A + k], rate[k], h)
+            try_axis(f, g, 3 + k, turn[k], rates[k], h)
+    else:
+        for k in range(3):
+            torque[k] = local[k] - f[T_A + k]
+        try_post(t, i, t.mount_i[i, 2], torque, turn, rate, rates, wide)
     for k in range(3):
-        try_axis(f, g, k, local[k] - f[T_A + k], rate[k], h)
-        try_axis(f, g, 3 + k, turn[k], rates[k], h)
         torque[k] = g[S_FORCE_NOW + 3 + k]
     if f[T_FAR] > 0.0:
         turned(turn, beta, 1.0, torque, moved)

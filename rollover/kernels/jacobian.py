@@ -29,6 +29,7 @@ from ground.kernel import (
 )
 from ground.law import REFERENCE_AREA
 from rollover.kernels.links import stiffen_links
+from rollover.kernels.posts import ROOM_COLUMNS, ROOM_ROWS, stiffen_post
 from rollover.kernels.tables import (
     A_C,
     A_K,
@@ -206,7 +207,7 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
     room = np.empty((ROOM, 6))
     add_elements(t, f, fd, K, room)
     add_wheels(t, f, fd, K, room)
-    add_mounts(t, f, fd, K, room)
+    add_mounts(t, f, fd, K, room, np.empty((ROOM_ROWS if t.post_f.shape[0] > 0 else 0, ROOM_COLUMNS)))
     stiffen_terms(t, f, fd, K)
     stiffen_links(t, f, fd, K)
     if t.axle_f.size > 0 and t.axle_memory[M_TORQUE_NOW] != 0.0:
@@ -224,10 +225,13 @@ def spin_row(t: Any, c: int, b: int, k: int, J: Any) -> None:
 
 
 @leaf
-def add_mounts(t: Any, f: float, fd: float, K: Any, room: Any) -> None:
+def add_mounts(t: Any, f: float, fd: float, K: Any, room: Any, wide: Any) -> None:
     """Springs of mounts and hinges along and about the axes of body a; none where they move in their play."""
     J, L, local = room[0], room[1], room[2]
     for i in range(t.mount_f.shape[0]):
+        if t.mount_i[i, 2] >= 0:
+            stiffen_post(t, i, t.mount_i[i, 2], f, fd, K, wide)
+            continue
         g, m = t.mount_f[i], t.mount_memory[i]
         c, b = t.mount_i[i, 0], t.mount_i[i, 1]
         under, upper = t.pose[c], t.pose[b]

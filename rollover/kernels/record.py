@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from ground.compiled import compiled, leaf
 from ground.kernel import AREA, ROW, SINKAGE
 from rollover.kernels.elements import kinetic_of_soil
 from rollover.kernels.inputs import V_NOW
+from rollover.kernels.posts import P_FOOT, P_USE, P_WAY, P_WORK, RECORDED
 from rollover.kernels.tables import (
     ACTIVE,
     DEEP,
@@ -55,6 +57,9 @@ def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
         for j in range(6):
             row[k + j] = t.mount_memory[i, S_FORCE_NOW + j]
             row[k + 6 + j] = t.mount_memory[i, S_DELTA_NOW + j]
+        if t.mount_i[i, 2] >= 0:  # what is found at its head, as its foot carries it
+            for j in range(3):
+                row[k + 3 + j] = t.post_memory[t.mount_i[i, 2], P_FOOT + j]
         k += 12
     row[k], row[k + 1] = t.axle_memory[M_ANGLE], t.axle_memory[M_IMPULSE]
     k += 2
@@ -77,6 +82,11 @@ def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
     for j in range(t.link_out.size):
         row[k] = t.link_out[j]
         k += 1
+    for i in range(t.post_f.shape[0]):
+        g = t.post_memory[i]
+        row[k] = math.sqrt(g[P_WAY] ** 2 + g[P_WAY + 1] ** 2 + g[P_WAY + 2] ** 2)
+        row[k + 1], row[k + 2] = g[P_WORK], g[P_USE]
+        k += RECORDED
     if t.device_i.shape[0] > 0:
         for j in range(OUT_COLUMNS):
             row[k + j] = t.device_out[j]

@@ -22,6 +22,7 @@ from rollover.kernels.impact import strike_stop
 from rollover.kernels.inputs import finish_inputs
 from rollover.kernels.links import finish_links
 from rollover.kernels.ploughing import plough
+from rollover.kernels.posts import finish_post
 from rollover.kernels.stand_devices import finish_devices, keep_poses
 from rollover.kernels.steering import steer
 from rollover.kernels.tables import (
@@ -169,6 +170,8 @@ def finish_mounts(t: Any) -> None:
                 if g[S_FLOWED_NOW + k] > 0.0 and g[S_FLOWED + k] == 0.0:
                     note_event(t, HINGE, i, place(t.pose[t.mount_i[i, 1]], 0.0, 0.0, 0.0), float(k))
                 g[S_SET + k], g[S_FLOWED + k] = g[S_SET_NOW + k], g[S_FLOWED_NOW + k]
+        if t.mount_i[i, 2] >= 0:
+            finish_post(t, i, t.mount_i[i, 2])
 
 
 @leaf

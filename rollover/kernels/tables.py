@@ -132,7 +132,7 @@ class Tables(NamedTuple):
     spin_mass: Any  # (n, n) what turning wheels add to the mass matrix; n = 6 nb + turning wheels
     drive: Any  # (DRIVES,)
     mount_f: Any  # (nt, MOUNT_COLUMNS)
-    mount_i: Any  # (nt, 2) rows of body a and body b
+    mount_i: Any  # (nt, 3) rows of body a and body b, row of the post that it is or -1: a spring on each axis
     axle_f: Any  # (AXLE_COLUMNS,) or (0,)
     axle_i: Any  # (2,) chassis and axle rows
     term_i: Any  # (ne, 3) kind, body, other body
@@ -191,6 +191,12 @@ class Tables(NamedTuple):
     link_f: Any  # (nl, LINK_COLUMNS)
     link_memory: Any  # (nl, LINK_MEMORY)
     link_out: Any  # (no,) what is recorded: contact force on each part (world), straps, joints; hitch, struts
+    # posts that bend, see rollover.kernels.posts; none unless a frame has segments
+    post_i: Any  # (npo, 2) first section and end
+    post_f: Any  # (npo, POST_COLUMNS)
+    post_memory: Any  # (npo, POST_MEMORY)
+    section_f: Any  # (nse, SECTION_COLUMNS)
+    section_memory: Any  # (nse, SECTION_MEMORY)
 
 
 @register
@@ -284,4 +290,9 @@ def handle(t: Any) -> Any:
         t.link_f,
         t.link_memory,
         t.link_out,
+        t.post_i,
+        t.post_f,
+        t.post_memory,
+        t.section_f,
+        t.section_memory,
     )

@@ -50,18 +50,23 @@ class Foot:
 
 def springs(feet: Sequence[Foot], beams: Sequence[Beam], body: MassProperties) -> tuple[Connector, ...]:
     """The feet as connectors. Raises ``ValueError``, path first, for a foot without a member."""
-    posts = [_post(foot, beams) for foot in feet]
+    posts = posts_of(feet, beams)
     return tuple(_spring(foot, k, posts, beams, body) for k, foot in enumerate(feet))
 
 
 def side_stiffnesses(feet: Sequence[Foot], beams: Sequence[Beam], body: MassProperties) -> dict[str, float]:
     """Of each foot's post against a side load at its top, by the foot's name, N/m."""
-    posts = [_post(foot, beams) for foot in feet]
+    posts = posts_of(feet, beams)
     found = {}
     for k, (foot, spring) in enumerate(zip(feet, springs(feet, beams, body), strict=True)):
-        sways = _rail(k, posts, beams, SIDE) is not None
+        sways = rail_of(k, posts, beams, SIDE) is not None
         found[foot.name] = spring.stiffness[1] if sways else spring.rotational_stiffness[0] / posts[k][0].length ** 2
     return found
+
+
+def posts_of(feet: Sequence[Foot], beams: Sequence[Beam]) -> list[tuple[Beam, Array]]:
+    """The member that stands on each foot, and its head. Raises ``ValueError``, path first, for one without."""
+    return [_post(foot, beams) for foot in feet]
 
 
 def _post(foot: Foot, beams: Sequence[Beam]) -> tuple[Beam, Array]:
@@ -80,7 +85,7 @@ def _ends(beam: Beam) -> tuple[tuple[Point, Point], tuple[Point, Point]]:
     return (beam.start, beam.end), (beam.end, beam.start)
 
 
-def _bending(beam: Beam, way: Array) -> tuple[float, float]:
+def bending(beam: Beam, way: Array) -> tuple[float, float]:
     """E I and M_p of bending that moves a member along a direction."""
     _, depth, width = beam.axes
     c, s = float(depth @ way), float(width @ way)
@@ -91,7 +96,9 @@ def _bending(beam: Beam, way: Array) -> tuple[float, float]:
     return beam.material.youngs_modulus * (p.second_h * c * c + p.second_b * s * s), moment
 
 
-def _rail(k: int, posts: Sequence[tuple[Beam, Array]], beams: Sequence[Beam], way: Array) -> tuple[Beam, float] | None:
+def rail_of(
+    k: int, posts: Sequence[tuple[Beam, Array]], beams: Sequence[Beam], way: Array
+) -> tuple[Beam, float] | None:
     """A member along a direction that ties the top of a post to another's, and how far the tops are apart."""
     post, top = posts[k]
     for beam in beams:
@@ -129,13 +136,13 @@ def _spring(
     length = 0.5 * angle * high
     for d in (0, 1):
         way = np.eye(3)[d]
-        EI, plastic = _bending(post, way)
-        rail = _rail(k, posts, beams, way)
+        EI, plastic = bending(post, way)
+        rail = rail_of(k, posts, beams, way)
         if rail is None:
             turn[1 - d], moment[1 - d] = 3.0 * EI / high, plastic
             continue
         beam, wide = rail
-        across, knee = _bending(beam, post.axes[0])
+        across, knee = bending(beam, post.axes[0])
         r = across / wide / (EI / high)
         shift[d] = 12.0 * EI / high**3 * (1.0 + 6.0 * r) / (4.0 + 6.0 * r)
         force[d] = (plastic + min(plastic, knee)) / high

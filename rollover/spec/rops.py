@@ -60,7 +60,10 @@ class Upper:
 
 @parameters
 class Rops:
-    """A frame on its mounts, in one part or two; the frame is rigid, the sway of its posts is in mounts and hinges."""
+    """A frame on its mounts, in one part or two; it is rigid, the sway of its posts is in mounts, hinges and feet.
+
+    With `segments` its posts bend along their length instead, and half of what ties their heads with each.
+    """
 
     frame: Literal["two-post-rear", "two-post-front", "four-post", "cab"]
     body: Annotated[MassProperties, "of the frame; without its upper part if there is one"]
@@ -69,6 +72,11 @@ class Rops:
         tuple[Foot, ...], "where beams stand on the chassis: as stiff and strong as their sections and steel", Later()
     ] = ()
     members: Annotated[tuple[Member, ...], "tubes, beams with a section and boxes that can touch the ground"]
+    segments: Annotated[
+        int | None,
+        Quantity("1", "of each post, which then bends in a run; null: a spring at each foot", least=2, most=100),
+        Later(),
+    ] = None
     upper: Upper | None = None
     corner: Annotated[Point, Quantity("m", "upper corner whose deflection is reported; the left one, y > 0")]
     other_corners: Annotated[
@@ -86,8 +94,20 @@ class Rops:
                 raise ValueError(f"{what}: none given; at least one{feet}")
             if len(set(names)) != len(names):
                 raise ValueError(f"{what}: two share a name, got {names}; each name once")
+        if self.segments is not None:
+            self._posts_bend()
         if free := free_motions({name: body for name, (body, _) in self.parts.items()}, self.joints):
             raise ValueError(sentence(free))
+
+    def _posts_bend(self) -> None:
+        """Refuse segments where there are no posts to bend, and what a post that bends does not have."""
+        if not self.feet:
+            raise ValueError(f"segments: no feet, got {self.segments}; feet of members with a section, or null")
+        if self.upper is not None:
+            raise ValueError(f"segments: a frame in two parts has none, got {self.segments}; null, or no upper part")
+        if loose := [f for f in self.feet if f.play > 0.0]:
+            what = f"feet.{loose[0].name}.play"
+            raise ValueError(f"{what}: a post that bends has no play, got {loose[0].play:g} m; 0, or segments: null")
 
     @property
     def hinges(self) -> tuple[Connector, ...]:

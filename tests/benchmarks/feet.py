@@ -15,7 +15,12 @@ from rollover.dynamics.simulate import run
 from rollover.scenario import load
 from tests.benchmarks.integrators import INTEGRATORS, timed_loops
 
-FRAMES = {"mounts": "vehicles/rops/two_post_rear_3t.yaml", "feet": "vehicles/rops/two_post_rear_tubes_3t.yaml"}
+TUBES = "vehicles/rops/two_post_rear_tubes_3t.yaml"
+FRAMES: dict[str, dict[str, object]] = {
+    "mounts": {"vehicle.rops": "vehicles/rops/two_post_rear_3t.yaml"},
+    "feet": {"vehicle.rops": TUBES},
+    "bent": {"vehicle.rops": TUBES, "vehicle.rops.segments": 8},  # 8 of a post, 4 of half the crossbar
+}
 SCENARIOS = ("side_overturn_slope", "field_upset_side")
 REPEATS = 3
 
@@ -29,9 +34,9 @@ class Cost:
     step: dict[str, float]
 
     @property
-    def ratio(self) -> float:
-        """Of feet over mounts."""
-        return self.step["feet"] / self.step["mounts"]
+    def ratios(self) -> tuple[float, float]:
+        """Of feet over mounts, of posts that bend over feet."""
+        return self.step["feet"] / self.step["mounts"], self.step["bent"] / self.step["feet"]
 
 
 def costs(repeats: int = REPEATS) -> Iterator[Cost]:
@@ -42,9 +47,9 @@ def costs(repeats: int = REPEATS) -> Iterator[Cost]:
             steps = base.simulation.duration / base.simulation.step
             found: dict[str, list[float]] = {frame: [] for frame in FRAMES}
             for k in range(repeats + 1):
-                for frame, file in FRAMES.items():
+                for frame, changes in FRAMES.items():
                     with timed_loops() as times:
-                        done = run(base.replaced({"vehicle.rops": file}))
+                        done = run(base.replaced(changes))
                     assert done.status == "done", done.sentence
                     found[frame] += [times[-1] / steps] * (k > 0)
             yield Cost(scenario=name, integrator=integrator, step={f: min(t) for f, t in found.items()})
@@ -52,10 +57,11 @@ def costs(repeats: int = REPEATS) -> Iterator[Cost]:
 
 def main() -> None:
     """Print the table."""
-    print(f"{'scenario':22} {'integrator':10} {'mounts, us':>10} {'feet, us':>10} {'ratio':>6}")
+    head = "".join(f"{frame + ', us':>12}" for frame in FRAMES)
+    print(f"{'scenario':22} {'integrator':10}{head} {'feet/mounts':>12} {'bent/feet':>10}")
     for c in costs(int(sys.argv[1]) if len(sys.argv) > 1 else REPEATS):
-        mounts, feet = 1e6 * c.step["mounts"], 1e6 * c.step["feet"]
-        print(f"{c.scenario:22} {c.integrator:10} {mounts:10.1f} {feet:10.1f} {c.ratio:6.2f}", flush=True)
+        steps = "".join(f"{1e6 * c.step[frame]:12.1f}" for frame in FRAMES)
+        print(f"{c.scenario:22} {c.integrator:10}{steps} {c.ratios[0]:12.2f} {c.ratios[1]:10.2f}", flush=True)
 
 
 if __name__ == "__main__":

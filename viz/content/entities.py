@@ -72,6 +72,7 @@ _SHOWN = {
 _BY_CHANNEL = {
     "ground/sinkage": ("mm", 1e3),
     "rops/deflection": ("mm", 1e3),
+    "rops/post/NAME/set": ("mm", 1e3),
     "device/deflection": ("mm", 1e3),
     "ground/contact_area": ("cm\N{SUPERSCRIPT TWO}", 1e4),
 }
@@ -143,7 +144,8 @@ def series(channel: str) -> Series:
     """
     entry = next((c for c in (channel, f"{channel}_x") if is_known(c)), None)
     group, name, colour = _describe(channel) if entry is not None else ("other", channel, _any(channel))
-    unit, factor = _BY_CHANNEL.get(channel) or shown(describe(entry).unit if entry is not None else "")
+    family = re.sub(r"^rops/post/[^/]+", "rops/post/NAME", channel)
+    unit, factor = _BY_CHANNEL.get(family) or shown(describe(entry).unit if entry is not None else "")
     slug = unit.replace("/", "_").replace(" ", "").replace("\N{SUPERSCRIPT TWO}", "2")
     last = "_".join(filter(None, (channel.replace("/", "_"), slug)))
     return Series(
@@ -213,6 +215,12 @@ def _describe_rops(channel: str, rest: list[str]) -> tuple[str, str, int]:
             return "sinkage", "ROPS deflection", LEDGER["rops"]
         case ["energy"]:
             return "energy", "absorbed by the ROPS", CYCLE[0]
+        case ["post", name, "set"]:
+            return "sinkage", f"set of post {name}", _any(channel)
+        case ["post", name, "plastic_work"]:
+            return "energy", f"plastic work of post {name}", _any(channel)
+        case ["post", name, "use"]:
+            return "use", f"use of post {name}", _any(channel)
     return "other", channel, _any(channel)
 
 
