@@ -123,7 +123,7 @@ def test_channels_of_a_run_are_a_recording(tmp_path: Path) -> None:
 @pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan])
 @pytest.mark.filterwarnings("error")
 def test_a_stamp_that_is_no_time_is_named(bad: float) -> None:
-    with pytest.raises(ValueError, match="time: not finite, got .* at stamp 2; seconds"):
+    with pytest.raises(ValueError, match=r"time: not finite, got .* at stamp 2; seconds"):
         Recording(title="run", time=np.array([0.0, bad, bad]), channels={})
 
 
