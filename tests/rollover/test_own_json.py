@@ -58,7 +58,8 @@ def test_a_comparison_of_another_kind_is_refused(value: object, tmp_path: Path) 
         (tmp_path / "compare.json").write_text(json.dumps(about))
         with pytest.raises(InputError) as refused:
             read_curves(tmp_path)
-        assert len(refused.value.faults) == 1 and "compare" in str(refused.value)
+        assert len(refused.value.faults) == 1
+        assert "compare" in str(refused.value)
 
 
 @pytest.mark.parametrize("text", ODD.values(), ids=ODD)
@@ -66,7 +67,8 @@ def test_an_account_that_is_none_leaves_a_study_alone(text: str, tmp_path: Path)
     (tmp_path / case_store.ACCOUNT).write_text(text)
     (tmp_path / case_store.CASES).mkdir()
     done = CliRunner().invoke(app, ["study", "rops_stiffness", "--out", str(tmp_path)])
-    assert done.exit_code == 2 and "another --out, or --force" in done.stderr
+    assert done.exit_code == 2
+    assert "another --out, or --force" in done.stderr
     assert (tmp_path / case_store.ACCOUNT).read_text() == text
 
 
