@@ -22,6 +22,7 @@ from rollover.spec.document import content_hash, dump, shipped_folder
 from rollover.system import own_code
 from rollover.system.boundary import worded
 from rollover.system.errors import Fault, InputError
+from rollover.system.own_json import read_json
 from rollover.system.writing import hold, own
 from rollover.system.writing import whole as whole
 
@@ -135,21 +136,16 @@ def claim_report(
     if not names or force:
         return target
     try:
-        found = json.loads((target / files[0]).read_text(encoding="utf-8"))
+        found = read_json(target / files[0])
     except (OSError, ValueError):
         found = {}
-    others = {key for key, value in about.items() if found.get(key) != value} if isinstance(found, dict) else {"format"}
+    others = {key for key, value in about.items() if found.get(key) != value}
     if others <= {"origin"} and found.get("format") == form:
         return target
     if others == {"scenario_hash"} and "origin" in about and found.get("format") == form:
         _say_replaced(say, folder, "report", found)
         return target
-    if (
-        isinstance(found, dict)
-        and found.get("format") == form
-        and own_report is not None
-        and (why := own_report(found))
-    ):
+    if found.get("format") == form and own_report is not None and (why := own_report(found)):
         if say is not None:
             say(f"{folder}: {why}")
         return target
@@ -213,12 +209,12 @@ def read_run_json(folder: Path) -> dict[str, Any]:
     """What the run.json of a results folder says. Raises `InputError`."""
     path = folder / RUN
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = read_json(path)
     except FileNotFoundError:
         raise _refused(folder, f"not a results folder, got no {RUN}; {AGAIN}") from None
-    except (OSError, RecursionError, ValueError) as e:
+    except (OSError, ValueError) as e:
         raise _refused(path, f"cannot be read: {worded(e)}; {AGAIN}") from None
-    if not isinstance(found, dict) or found.get("format") != FORMAT:
+    if found.get("format") != FORMAT:
         raise _refused(path, f"not the {RUN} of a run; format {FORMAT!r} is needed")
     return found
 

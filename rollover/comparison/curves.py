@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,9 +14,12 @@ from rollover.recording import Recording, read_parquet, write_parquet
 from rollover.system.boundary import worded
 from rollover.system.errors import Fault, InputError
 from rollover.system.names import distinct
+from rollover.system.own_json import TEXT, read_json
 
 JSON = "compare.json"
 SIDES = ("measured", "simulated")
+ANY = {"format": TEXT, **dict.fromkeys(("baseline", "candidate"), ({"folder": TEXT},))}  # of recordings or of two runs
+COMPARED = {"recordings": [TEXT]}
 AGAIN = "`rollover compare` writes it anew"
 
 Array = NDArray[np.float64]
@@ -60,13 +62,13 @@ def read_curves(folder: Path) -> dict[str, tuple[Path, Recording]]:
     if not (folder / JSON).is_file():
         return {}
     try:
-        said = json.loads((folder / JSON).read_text(encoding="utf-8"))
-        names = said["recordings"] if said["format"] == FORMAT else None
-    except (OSError, ValueError, KeyError, TypeError) as e:
+        said = read_json(folder / JSON, ANY)
+        names = read_json(folder / JSON, COMPARED)["recordings"] if said["format"] == FORMAT else None
+    except (OSError, ValueError) as e:
         message = f"cannot be read: {worded(e)}; {AGAIN}"
         raise InputError(Fault(file=str(folder / JSON), message=message)) from None
     if names is None:
-        sides = [str(said[side]["folder"]) for side in ("baseline", "candidate") if side in said]
+        sides = [said[side]["folder"] for side in ("baseline", "candidate") if said.get(side)]
         message = f"two runs compared, got no histories of its own; those of the runs: {', '.join(sides)}"
         raise InputError(Fault(file=str(folder), message=message))
     found = {}

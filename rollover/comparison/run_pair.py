@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover import scenario
-from rollover.assessment.answer_shape import misfit_of
+from rollover.assessment.answer_shape import ANSWER
 from rollover.assessment.loads import PeakLoad, leading
 from rollover.assessment.results import CHANNELS, RUN, SCENARIO, read_run_json
 from rollover.recording import Recording, read_parquet
@@ -22,6 +22,7 @@ from rollover.recording.attitude import beside
 from rollover.scenario import Scenario
 from rollover.spec import document
 from rollover.system.errors import Fault, InputError
+from rollover.system.own_json import misfit_of
 
 Array = NDArray[np.float64]
 
@@ -125,7 +126,7 @@ def read(folder: Path) -> Result:
     for name in (SCENARIO, CHANNELS):
         if not (folder / name).is_file():
             raise InputError(Fault(file=str(folder), message=f"no {name} there; run it again with `rollover run`"))
-    if wrong := misfit_of(answer):
+    if wrong := misfit_of(answer, ANSWER):
         raise InputError(Fault(file=str(folder / RUN), path=wrong[0], message=wrong[1]))
     known = {f.name for f in fields(PeakLoad)}
     for i, peak in enumerate(answer["peak_loads"]):

@@ -18,6 +18,7 @@ from typing import Any
 
 from rollover.system.boundary import reading
 from rollover.system.errors import Fault, InputError
+from rollover.system.own_json import read_json
 
 SEAL, TRUTH = "seal.json", "truth.json"
 PRIVATE = 0o600  # of a truth: for its owner
@@ -72,8 +73,8 @@ def write_truth(
 def opened(shown: str, path: Path) -> list[dict[str, Any]]:
     """Truths of a truth.json whose seal was `shown` before. Raises `InputError` if it is not the same truth."""
     with reading(path, "truth that was sealed", CURE):
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(found, dict) or found.get("format") != TRUTH_FORMAT:
+        found = read_json(path)
+        if found.get("format") != TRUTH_FORMAT:
             raise ValueError(f"format {TRUTH_FORMAT!r} is missing")
         truths, salt = found.get("truths"), found.get("salt")
         if not isinstance(truths, list) or not isinstance(salt, str):

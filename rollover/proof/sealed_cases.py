@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from rollover.proof.commitment import SEAL, SEAL_FORMAT, Seal, opened, sealed
 from rollover.proof.handover import fingerprint
 from rollover.proof.runner import made_cases, orders_of
 from rollover.system.errors import Fault, InputError
+from rollover.system.own_json import read_json
 
 FORMAT, LIST = "rollover-benchmark/1", "benchmark.json"
 CANDIDATES_FORMAT, CANDIDATES = "rollover-candidates/1", "candidates.json"
@@ -105,10 +105,10 @@ def truths_of(given: Sealed, path: Path) -> list[dict[str, Any]]:
 
 def _read(path: Path, form: str, *keys: str) -> dict[str, Any]:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        found = read_json(path)
+    except (OSError, ValueError):
         raise _no_cases(path, "it is missing, or no JSON") from None
-    if not isinstance(found, dict) or found.get("format") != form or not found.keys() >= set(keys):
+    if found.get("format") != form or not found.keys() >= set(keys):
         raise _no_cases(path, f"format {form!r} with {', '.join(keys)} is needed")
     return found
 

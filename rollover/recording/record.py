@@ -68,7 +68,7 @@ class Sensor:
 class Recording:
     """Channels (see `channels.CHANNELS`), SI, one value each per time stamp, 64-bit; gaps are NaN.
 
-    `time` (n,) strictly increasing, s; `channels` name -> (n,); `noise` name -> 1 sigma; `cfc` name -> class
+    `time` (n,) finite and strictly increasing, s; `channels` name -> (n,); `noise` name -> 1 sigma; `cfc` name -> class
     of the filter already applied; `conditions` scenario path -> value this was run with, `uncertainty` the same
     path -> 1 sigma; `sensors` name -> where it was measured; `notes` what the reader of the file has to say. A channel
     with its own, slower clock stands in the common table with gaps between its samples; `samples` gives it back alone.
@@ -94,6 +94,9 @@ class Recording:
             object.__setattr__(self, "channels", as_kept)
         if self.time.ndim != 1 or self.time.size == 0:
             raise ValueError(f"time: empty or not one column, got shape {self.time.shape}; at least one stamp")
+        if not np.isfinite(self.time).all():
+            at = int(np.argmin(np.isfinite(self.time)))
+            raise ValueError(f"time: not finite, got {float(self.time[at])!r} at stamp {at + 1}; seconds are needed")
         if not np.all(np.diff(self.time) > 0):
             at = int(np.argmin(np.diff(self.time)))
             before, after = float(self.time[at]), float(self.time[at + 1])

@@ -100,11 +100,17 @@ def read_parquet(path: Path) -> Recording:
         about["uncertainty"] = {path: _tuples(sigma) for path, sigma in about.get("uncertainty", {}).items()}
         about["sensors"] = {name: _sensor(values) for name, values in about.get("sensors", {}).items()}
         about["notes"] = tuple(about.get("notes", ()))
-        return Recording(time=columns.pop("time"), channels=columns, **about)
+        time = columns.pop("time")
     except InputError:
         raise
     except (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError, pa.ArrowException):
         # someone else wrote it
+        raise InputError(not_a_run) from None
+    try:
+        return Recording(time=time, channels=columns, **about)
+    except ValueError as e:
+        raise InputError(Fault(file=str(path), message=str(e))) from None
+    except TypeError:
         raise InputError(not_a_run) from None
 
 

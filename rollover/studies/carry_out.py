@@ -24,6 +24,7 @@ from rollover.studies.runner import Builder, Conducted, Progress, Way, conduct, 
 from rollover.studies.study import Study, load
 from rollover.studies.summary import answers, values_of
 from rollover.system.errors import Fault, InputError
+from rollover.system.own_json import read_json
 from rollover.system.writing import holding, sweep
 
 Page = Callable[[Conducted, Mapping[str, Any]], str]
@@ -134,7 +135,7 @@ def _begin(ready: Prepared) -> None:
 
 def _name_of(report: Path) -> str:
     try:
-        return str(json.loads(report.read_text(encoding="utf-8")).get("name", ""))
+        return str(read_json(report).get("name", ""))
     except (OSError, ValueError):
         return ""
 

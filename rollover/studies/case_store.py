@@ -6,7 +6,6 @@ the same scenario share a file.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from rollover.recording import UnreadableError, put_text, read_pairs, read_table
 from rollover.studies.case import Result, stated_versions
 from rollover.studies.study import Study, meaning_of, unit_of
 from rollover.system.errors import Fault, InputError
+from rollover.system.own_json import read_json
 from rollover.system.processes import Failure
 from rollover.system.writing import PART, hold, own
 
@@ -112,7 +112,7 @@ def claim(folder: Path, name: str, *, force: bool) -> Path:
     if force or not set(names) - {LOCK, STUDY}:  # nothing yet, or killed before anything was there
         return target
     try:
-        found = json.loads((target / ACCOUNT).read_text(encoding="utf-8"))
+        found = read_json(target / ACCOUNT)
     except (OSError, ValueError):
         raise _refused(folder, f"holds results without a {ACCOUNT}; another --out, or --force") from None
     if found.get("format") != FORMAT or found.get("name") != name:

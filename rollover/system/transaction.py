@@ -16,6 +16,7 @@ from typing import Any
 from rollover.system import writing
 from rollover.system.boundary import worded
 from rollover.system.errors import Fault, InputError
+from rollover.system.own_json import read_json
 
 JOURNAL = ".update.json"
 FORMAT = "rollover-update/1"
@@ -56,7 +57,7 @@ def update(folder: Path, files: Mapping[Path, str]) -> Iterator[Path]:
 def finish(journal: Path) -> None:
     """Bring what a journal names to its place, from wherever that stopped; nothing where there is no journal."""
     try:
-        told = json.loads(journal.read_text(encoding="utf-8"))
+        told = read_json(journal)
     except FileNotFoundError:
         return
     except (OSError, ValueError) as e:
@@ -77,7 +78,11 @@ def _checked(told: Any, journal: Path) -> list[tuple[Path, Path]]:
     """What goes where. Raises `InputError` for a journal that this did not write: its own folder's files at least."""
     try:
         moves = [(Path(a), Path(b)) for a, b in told["files"]]
-        good = told["format"] == FORMAT and len(told["account"]) == 2 and isinstance(told["journals"], list)
+        good = (
+            told["format"] == FORMAT
+            and len(told["account"]) == 2
+            and all(isinstance(each, str) for each in told["journals"])
+        )
         good = good and all(a.parent.resolve() == b.parent.resolve() and writing.own(b, a.name) for a, b in moves)
         good = good and journal.parent.resolve() in {b.parent.resolve() for _, b in moves}
         part, target = map(Path, told["account"])

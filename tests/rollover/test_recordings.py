@@ -120,6 +120,13 @@ def test_channels_of_a_run_are_a_recording(tmp_path: Path) -> None:
         assert np.array_equal(read_recording(path)["ground/sinkage"], np.arange(3.0))
 
 
+@pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan])
+@pytest.mark.filterwarnings("error")
+def test_a_stamp_that_is_no_time_is_named(bad: float) -> None:
+    with pytest.raises(ValueError, match=r"time: not finite, got .* at stamp 2; seconds"):
+        Recording(title="run", time=np.array([0.0, bad, bad]), channels={})
+
+
 # ---- published sets
 
 

@@ -182,7 +182,7 @@ def test_a_failed_run_is_written_with_its_sentence(folder: Path) -> None:
         (None, "not a results folder, got no run.json"),
         ("{", "run.json: cannot be read: "),
         ("{}", "run.json: not the run.json of a run; format 'rollover-run/1' is needed"),
-        ("[]", "run.json: not the run.json of a run; format 'rollover-run/1' is needed"),
+        ("[]", "run.json: cannot be read: not a mapping, got a list of 0; "),
     ],
 )
 def test_reading_what_is_not_a_run(tmp_path: Path, text: str | None, message: str) -> None:

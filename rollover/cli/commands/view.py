@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +10,7 @@ import typer
 
 from rollover.cli.commands.common import Force, answering, app, manual
 from rollover.system.errors import Fault, InputError, absent
+from rollover.system.own_json import read_json
 
 
 @app.command(
@@ -110,7 +110,7 @@ def _about(path: Path) -> tuple[str, str]:
     from rollover.assessment.results import RUN, versions
 
     try:
-        found = json.loads((path.parent / RUN).read_text(encoding="utf-8"))
+        found = read_json(path.parent / RUN)
         own, scenario, title = found["versions"]["rollover"], found["scenario_hash"], found["title"]
     except (OSError, ValueError, KeyError, TypeError):  # no run's folder
         return path.stem, f"rollover {versions()['rollover']}."
