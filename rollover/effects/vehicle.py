@@ -227,12 +227,13 @@ class MountPlay(Effect):
     search: ClassVar[Mapping[str, Search]] = {"gap": Search(5e-4, 0.05, "log")}
 
     def changes(self, scenario: Any) -> Mapping[str, Any]:
-        """The play of every mount and foot, beyond what it has."""
+        """The play of every mount and foot, beyond what it has; posts that bend have none."""
         rops = scenario.vehicle.rops if isinstance(scenario.vehicle, Vehicle) else None
         if rops is None or self.gap == 0.0:
             return {}
         mounts = {f"vehicle.rops.mounts.{m.name}.play": tuple(p + self.gap for p in m.play) for m in rops.mounts}
-        return mounts | {f"vehicle.rops.feet.{foot.name}.play": foot.play + self.gap for foot in rops.feet}
+        feet = () if rops.segments is not None else rops.feet
+        return mounts | {f"vehicle.rops.feet.{foot.name}.play": foot.play + self.gap for foot in feet}
 
 
 @parameters

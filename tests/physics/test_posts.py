@@ -275,6 +275,17 @@ def test_what_cannot_bend_is_refused(changes: dict[str, Any], said: str) -> None
         replace(FRAME, segments=6, **changes)
 
 
+def test_effects_of_the_rops_reach_its_posts() -> None:
+    """Stiffness and yield as those of feet; of play, which they do not have, a scenario says that nothing feels it."""
+    base = load("field_upset_bent")
+    weak = base.replaced({"effects.rops-plasticity.yield_force": 20e3}).applied().vehicle.rops  # type: ignore[union-attr]
+    assert weak is not None
+    assert [f.side_yield for f in weak.feet] == [10e3, 10e3]
+    loose = base.replaced({"effects.mount-play.gap": 0.002})
+    assert loose.applied().vehicle == base.vehicle
+    assert "effects.mount-play: needs a ROPS; nothing feels it here" in loose.idle
+
+
 def test_a_tractor_s_work_on_its_posts_is_the_ledger_s() -> None:
     """A head moved and turned about all axes at once: the account of the ROPS is the work of its load."""
     t = bent()
