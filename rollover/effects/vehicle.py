@@ -250,9 +250,7 @@ class TankSlosh(Effect):
     id = "tank-slosh"
     family = "a mass that moves in the vehicle"
     equation = "m (u'' + a_y - g_y) + 2 damping m w u' + m w^2 u = 0, w^2 = g/length"
-    source = (
-        "tanks of 0.8-1.2 m: 0.75-0.95 Hz, length 0.28-0.44 m, half of it (computed); damping 0.5-5 % (recalled)"
-    )
+    source = "tanks of 0.8-1.2 m: 0.75-0.95 Hz, length 0.28-0.44 m, half of it (computed); damping 0.5-5 % (recalled)"
     sentence = "{mass} of liquid slosh across the vehicle like a pendulum of {length}."
     rivals: ClassVar[Mapping[str, str]] = {"payload-shift": "a tank filled to the brim, or another level"}
     acts = ("rollover",)

@@ -233,6 +233,8 @@ def test_long_names_break_behind_their_parts() -> None:
     assert widths.breakable(name) == '<span class="pre">rops/<wbr>mount/<wbr>NAME/<wbr>force_<wbr>x</span>'
     whole = '<a href="a/b_c.html">a/b</a> <span class="pre">--out</span> <span class="pre">0.5</span>'
     assert widths.breakable(whole) == whole
+    line = '<div class="highlight-sh notranslate"><pre>run<span class="w"> </span>--no-half-step</pre></div>'
+    assert '<span class="w"> </span><span class="whole">--no-half-step</span></pre>' in widths.breakable(line)
 
 
 def test_a_page_is_a_notebook_with_its_blocks_as_cells() -> None:
