@@ -30,6 +30,7 @@ from __future__ import annotations
 import importlib
 import math
 import pkgutil
+import sys
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -162,6 +163,8 @@ def laws() -> dict[str, type[GroundLaw]]:
     while todo:
         law = todo.pop(0)
         todo += law.__subclasses__()
+        if not is_current(law):
+            continue
         kind = getattr(law, "kind", None)
         if not isinstance(kind, str):
             raise TypeError(f"{law.__module__}.{law.__name__}: a law needs a field `kind` with its name as default")
@@ -169,6 +172,13 @@ def laws() -> dict[str, type[GroundLaw]]:
             raise TypeError(f"{law.__module__}.{law.__name__}: law name {kind!r} is taken by {table[kind].__module__}")
         table[kind] = law
     return dict(sorted(table.items()))
+
+
+def is_current(kind: type) -> bool:
+    """Whether a class is the one that its module holds: not of a file that failed, or of an earlier import of it."""
+    module = sys.modules.get(kind.__module__)
+    is_inner = "." in kind.__qualname__
+    return module is not None and (is_inner or getattr(module, kind.__name__, None) is kind)
 
 
 def evaluate(law: GroundLaw, z: float, v: float = 0.0, *, speed: float, mass: float = REFERENCE_MASS) -> float:

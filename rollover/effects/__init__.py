@@ -12,6 +12,7 @@ from dataclasses import fields
 from types import ModuleType
 from typing import Any
 
+from ground.law import is_current
 from ground.promises import broken_by_term
 from ground.settings import ForceTerm
 from rollover.effects import empirical, ground, parameter, sensor, striker, vehicle
@@ -40,7 +41,7 @@ MOST = 3  # sensor effects of one id in a scenario, each on its own channel
 def effects() -> dict[str, type[Effect]]:
     """Every effect that exists, by its id; those of one's own files last. Raises `InputError`."""
     own_code.load("effects", _wrong)
-    return dict(EFFECTS)
+    return {each: effect for each, effect in EFFECTS.items() if is_current(effect)}
 
 
 def _wrong(module: ModuleType) -> str:

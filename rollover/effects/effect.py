@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any, ClassVar, Literal, NamedTuple
 
+from ground.law import is_current
 from ground.quantity import parameters, quantities
 from ground.settings import ForceTerm
 from rollover.recording import Recording
@@ -96,7 +97,11 @@ class Effect:
         known = EFFECTS.get(cls.id)
         if not cls.id:
             raise TypeError(f"{cls.__module__}.{cls.__name__}: an effect needs an `id`")
-        if known is not None and (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+        if (
+            known is not None
+            and is_current(known)
+            and (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__)
+        ):
             raise TypeError(f"{cls.__module__}.{cls.__name__}: effect {cls.id!r} is taken by {known.__module__}")
         EFFECTS[cls.id] = cls
 

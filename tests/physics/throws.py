@@ -11,6 +11,7 @@ from rollover.scenario import Scenario
 from tests.physics.scenes import shipped
 
 WIDE = {"ground.elements.length": 6.3, "ground.elements.width": 6.3}  # what is thrown without friction goes far
+FIELD = {"ground.elements.length": 40.0, "ground.elements.width": 40.0}  # 6 m/s for the 4 s of a run, either way
 
 
 def throw(rng: np.random.Generator) -> Scenario:
@@ -35,12 +36,14 @@ def overturn(rng: np.random.Generator) -> Scenario:
     changes: dict[str, Any]
     if which == 0:
         changes = {
+            **FIELD,
             "ground.surface.angle_deg": float(rng.uniform(5.0, 35.0)),
             "initiation.heading_deg": float(rng.uniform(-15.0, 15.0)),
             "initiation.roll_rate": float(rng.uniform(0.0, 1.0)),
         }
         return shipped("side_overturn_slope").replaced(changes)
     changes = {
+        **FIELD,
         "initiation.speed": float(rng.uniform(3.0, 6.0)),
         "initiation.heading_deg": float(rng.uniform(8.0, 16.0)),
     }

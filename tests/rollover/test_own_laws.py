@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
 
 from rollover.cli import templates
+from rollover.effects import effects
+from rollover.scenario import load
+from rollover.spec.laws import laws
+from rollover.system import own_code
+from rollover.system.errors import InputError
 from tests.rollover.test_effects_contract import outside
 
 STUDY = """format: rollover-study/1
@@ -139,3 +145,24 @@ def test_a_missing_or_empty_file_of_laws_is_one_line(tmp_path: Path) -> None:
         done = outside("-m", "tests.rollover.command", "--laws", str(path), "list", "laws")
         assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
         assert said in done.stderr
+
+
+@pytest.mark.parametrize("kind", ["laws", "effects"])
+def test_a_refused_file_leaves_nothing_behind(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In one process that keeps the refusal, as a notebook does: scenarios load as before, the mended file too."""
+    monkeypatch.setenv(own_code.KINDS[kind], str(path := tmp_path / "weed.py"))
+    (text,) = templates.written(kind.removesuffix("s"), "weed").values()
+    path.write_text(f"{text}\nraise OSError('no such file')\n", encoding="utf-8")
+    table = {"laws": laws, "effects": effects}[kind]
+    with pytest.raises(InputError, match="no such file") as kept:
+        table()
+    with monkeypatch.context() as without:
+        without.delenv(own_code.KINDS[kind])
+        assert not [each for each in table() if "weed" in each]
+        assert load("drop_test").title
+    path.write_text(text, encoding="utf-8")
+    (made,) = (each for name, each in table().items() if "weed" in name)
+    chosen = {"ground.law": {"kind": "weed", "stiffness": 2e4}} if kind == "laws" else {f"effects.{made.id}": {}}
+    assert load("drop_test").replaced(chosen).title
+    assert kept.value.faults
+    del sys.modules[made.__module__]

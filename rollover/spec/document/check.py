@@ -56,7 +56,7 @@ def _holds(node: Node, kind: Any, location: tuple[Any, ...]) -> bool:
 def adapter(kind: Any) -> TypeAdapter[Any]:
     """Return the validator of a class as it is now: a new law or effect makes a new one."""
     tables = _open_tables(slot_of(kind))
-    return _adapter(kind, tuple(tuple(sorted((k, id(v)) for k, v in table().items())) for table in tables))
+    return _adapter(kind, tuple(tuple(sorted(table().items())) for table in tables))
 
 
 @functools.lru_cache(maxsize=32)
