@@ -3,6 +3,7 @@
 from typing import Any
 
 import notebooks
+import widths
 
 project = "rollover"
 author = "The rollover authors"
@@ -25,5 +26,6 @@ nb_render_markdown_format = "myst"
 
 
 def setup(app: Any) -> None:
-    """Draw the cells of a shell as what a terminal takes."""
+    """Draw the cells of a shell as what a terminal takes, and let long names break."""
     app.connect("doctree-read", notebooks.shown)
+    app.connect("html-page-context", widths.fold)

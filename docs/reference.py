@@ -174,7 +174,11 @@ def channels() -> str:
 
 def effects_() -> str:
     """Every effect: equation, numbers, source, look-alikes and the test that tells them apart."""
-    text = ["# Effects\n", "Switched on by `--set effects.ID.PARAMETER=VALUE`; at its null an effect changes no bit.\n"]
+    text = [
+        "# Effects\n",
+        "Switched on by `--set effects.ID.PARAMETER=VALUE`; at its null an effect changes no bit.",
+        "`recalled` in a source: from memory, not held against the print; where a search starts, not a truth.\n",
+    ]
     for name, kind in effects().items():
         about = {
             "equation": code(kind.equation),

@@ -6,6 +6,7 @@ A title is the name of a shipped scenario, and it stays when values are replaced
 from __future__ import annotations
 
 import functools
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,9 @@ from rollover.scenario import Scenario, load
 from rollover.spec import document
 
 MOST_IN_WORDS = 12  # differences that are told one by one on a terminal
+MOST_OF_A_PART = 6  # values of a part that only one of them has, told one by one; effects have up to six numbers
 WHOLE = ("kind", "name")  # a part with another kind or name is another part, told as one
+SAID = ("title", "provenance")  # words about the values
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,20 +56,43 @@ def origin(scenario: Scenario) -> Origin | None:
     changed = [p for p in [*was, *(p for p in now if p not in was)] if was.get(p) != now.get(p)]
     parts = [p.rpartition(".")[0] for p in changed if p.rpartition(".")[2] in WHOLE and p in was and p in now]
     found: dict[str, Difference] = {}
+    alone = _one_sided(was, now) | _one_sided(now, was)
     for p in changed:
-        above = next((part for part in sorted(parts, key=len) if part and p.startswith(f"{part}.")), None)
-        key = next((f"{above}.{word}" for word in WHOLE if f"{above}.{word}" in changed), p) if above else p
-        name = above or p
-        before, after = _shown(was.get(key)), _shown(now.get(key))
+        if above := next((part for part in sorted(parts, key=len) if part and p.startswith(f"{part}.")), None):
+            key = next((f"{above}.{word}" for word in WHOLE if f"{above}.{word}" in changed), p)
+            name, before, after = above, _shown(was.get(key)), _shown(now.get(key))
+        elif part := next((part for part in alone if p.startswith(f"{part}.")), None):
+            name, before, after = part, _elements(was, part), _elements(now, part)
+        else:
+            key, name, before, after = p, p, _shown(was.get(p)), _shown(now.get(p))
         if before == after:  # to the last digit
             before, after = repr(was.get(key)), repr(now.get(key))
         found.setdefault(name, Difference(path=name, shipped=before, now=after))
     return Origin(name=path.stem, differences=tuple(found.values()))
 
 
+def _one_sided(some: Mapping[str, Any], others: Mapping[str, Any]) -> set[str]:
+    """Largest parts of more than a few values that the others have nothing of."""
+    counts = Counter(part for path in some for part in _above(path))
+    shared = {part for path in others for part in _above(path)}
+    alone = {part for part, count in counts.items() if count > MOST_OF_A_PART and part not in shared}
+    return {part for part in alone if alone.isdisjoint(_above(part))}
+
+
+def _above(path: str) -> list[str]:
+    words = path.split(".")
+    return [".".join(words[:n]) for n in range(1, len(words))]
+
+
+def _elements(values: Mapping[str, Any], part: str) -> str:
+    """Names of what stands directly in a part."""
+    inside = (path.removeprefix(f"{part}.").partition(".")[0] for path in values if path.startswith(f"{part}."))
+    return ", ".join(dict.fromkeys(inside)) or "none"
+
+
 def _leaves(scenario: Scenario) -> dict[str, Any]:
     """Every value by its path; what is not given and what is empty are one."""
-    leaves = ((leaf.path, leaf.value) for leaf in document.paths(scenario) if leaf.path != "title")
+    leaves = ((leaf.path, leaf.value) for leaf in document.paths(scenario) if not set(leaf.path.split(".")) & {*SAID})
     return {path: value for path, value in leaves if not _nothing(value)}
 
 

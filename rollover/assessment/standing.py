@@ -20,6 +20,7 @@ from rollover.spec.document import find, slot_of, stated_kind
 from rollover.spec.document import headings as headings_of
 from rollover.spec.document import load as load_as
 from rollover.spec.initiation import Standing
+from rollover.spec.standards.static_sequence import usual_code
 from rollover.spec.vehicle import Vehicle
 from rollover.system.arguments import within
 from rollover.system.errors import Fault, InputError
@@ -144,7 +145,7 @@ def json_of(found: Stability, about: Mapping[str, Any] | None = None) -> dict[st
         "vehicle": vehicle.name,
         "versions": versions(),
         "least": {"heading_deg": weakest["heading_deg"], "balance_deg": weakest["balance_deg"]},
-        "code_6": CODE_6,
+        "code_6": {**CODE_6, "applies": usual_code(vehicle) in ("code-6", "code-7")},
         "effects_left_out": sorted(found.scenario.effects),
         "headings": rows,
         "losses": [

@@ -260,7 +260,8 @@ def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Bo
             Fault(
                 path="initiation",
                 message=f"no balance on two wheels was found on this surface, got side {tip.side!r}; "
-                "side or heading_deg so that it falls downhill, or a flatter surface",
+                "side or heading_deg so that it falls downhill, a flatter surface, or another initiation.kind, such as "
+                "driving over the edge",
             )
         )
     u = statics.seated(u, fixed=(ROLL,))

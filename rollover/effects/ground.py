@@ -1,7 +1,7 @@
 """Effects of the ground: terms of an element's loading curve, of its way back, of the mass that moves along.
 
-Forces are those of the reference face (140 mm x 45 mm) and grow with the area of contact. `M` in a source: recalled,
-source not checked, with high (+), medium or low (-) confidence: where a search starts, not a truth.
+Forces are those of the reference face (140 mm x 45 mm) and grow with the area of contact. "Recalled" in a source: from
+memory, not held against the print; sure of it, fairly sure, or unsure: where a search starts, not a truth.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class SoilViscousDamping(Effect):
     family = SPEED
     equation = "F = F (1 + J v) + d v^zeta, v > 0, on the loading curve"
     source = (
-        "Ye 2006 eq (1); half-space c = 3.4 r0^2 sqrt(rho G)/(1 - nu) gives 1.1-3.0 kN s/m for G 5-40 MPa (M); "
-        "J of Smith's law 0.5-0.65 s/m (M+)"
+        "Ye 2006 eq (1); half-space c = 3.4 r0^2 sqrt(rho G)/(1 - nu) gives 1.1-3.0 kN s/m for G 5-40 MPa (recalled); "
+        "J of Smith's law 0.5-0.65 s/m (recalled, fairly sure)"
     )
     sentence = "The ground resists in proportion to the speed: {damping} on 63 cm2, with exponent {exponent}."
     rivals: ClassVar[Mapping[str, str]] = {
@@ -91,8 +91,8 @@ class SoilRateHardening(Effect):
     family = SPEED
     equation = "F *= 1 + lambda log10(max(v, v_0)/v_0), or (max(v, v_least)/v_0)^beta"
     source = (
-        "s_u = s_u0 (1 + lambda log10(rate/rate_0)), lambda 0.05-0.20; a power of the rate, 0.05-0.1 (M+); "
-        "eq (5) of Ye 2006 softens instead"
+        "s_u = s_u0 (1 + lambda log10(rate/rate_0)), lambda 0.05-0.20; a power of the rate, 0.05-0.1 (recalled, fairly "
+        "sure); eq (5) of Ye 2006 softens instead"
     )
     sentence = "The ground is {per_decade} stronger for each tenfold speed."
     rivals: ClassVar[Mapping[str, str]] = {
@@ -145,7 +145,7 @@ class SoilInertialDrag(Effect):
     id = "soil-inertial-drag"
     family = SPEED
     equation = "F += 1/2 C rho A v^2, v > 0, on the loading curve"
-    source = "Poncelet; C 1-4.4 (M), 70-300 N at 3.5 m/s on the reference face"
+    source = "Poncelet; C 1-4.4 (recalled), 70-300 N at 3.5 m/s on the reference face"
     sentence = "Soil that is thrown aside resists with the square of the speed, C = {coefficient}."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-viscous-damping": "drops over a range of speeds of 4 to 1 or more: v^2 against v",
@@ -182,8 +182,8 @@ class SoilAddedMassGrowth(Effect):
         "g = 1, behind the reach exp(-(z - reach)/fade)"
     )
     source = (
-        "m_b1 = rho A (beta z + alpha sqrt A), rho 1700-2000 kg/m3, rho A = 11 kg/m on the reference face (M); "
-        "k rho r^3 of a cone, von Karman 1929, Wagner 1932 (M+); the fade is a number to be fitted"
+        "m_b1 = rho A (beta z + alpha sqrt A), rho 1700-2000 kg/m3, rho A = 11 kg/m on the reference face (recalled); "
+        "k rho r^3 of a cone, von Karman 1929, Wagner 1932 (recalled, fairly sure); the fade is a number to be fitted"
     )
     sentence = "The soil or fluid that moves along grows by {rate} of depth."
     rivals: ClassVar[Mapping[str, str]] = {
@@ -228,7 +228,7 @@ class SoilElasticRebound(Effect):
     id = "soil-elastic-rebound"
     family = "an unloading path that is not the plastic one"
     equation = "K_u = K'(z_max)/max(recovery, that of the law); c_u = 2 damping_ratio sqrt(K_u (m_s + m_b1))"
-    source = "rebound of 2-10 % of z_max in clay (M); the damping ratio is a guess (M-)"
+    source = "rebound of 2-10 % of z_max in clay (recalled); the damping ratio is a guess (recalled, unsure)"
     sentence = "The ground springs back by {recovery} of the deepest sinkage."
     rivals: ClassVar[Mapping[str, str]] = {"soil-adhesion": "the sign of the force at lift-off"}
     channels = ("ground/sinkage", "striker/velocity_z", "ground/force_normal")
@@ -260,7 +260,7 @@ class SoilAdhesion(Effect):
     solid = True
     family = "a pull at lift-off"
     equation = "F = max(line, -c_a A max(1 - gap/reach, 0)); gap = rut - z"
-    source = "c_a 1-10 kPa in the field, suction up to 80-100 kPa (M); the reach is a guess (M-)"
+    source = "c_a 1-10 kPa in the field, suction up to 80-100 kPa (recalled); the reach is a guess (recalled, unsure)"
     sentence = "The ground holds on to the face with {stress} when it is pulled out."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-bias": "the level before contact: a bias stands there too",
@@ -294,7 +294,7 @@ class SoilLayer(Effect):
     equation = (
         "F = K'(z) (z + (ratio - 1) (z - onset depth)) + k_h (z - depth) for z > depth; onset 0: F = ratio K'(z) z"
     )
-    source = "hardpan at 0.2-0.35 m, cone index ratio 2-4 (M)"
+    source = "hardpan at 0.2-0.35 m, cone index ratio 2-4 (recalled)"
     sentence = "Below {depth} the ground is {stiffness_ratio} times as stiff."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-viscous-damping": "two speeds: a layer keeps its depth, damping does not",
@@ -342,7 +342,7 @@ class SoilCrust(Effect):
     solid = True
     family = DEPTH
     equation = "F = ratio K'(z) z for z < thickness; K'(z) (z + (ratio - 1) remains thickness) below"
-    source = "20-80 mm (M)"
+    source = "20-80 mm (recalled)"
     sentence = "The upper {thickness} of the ground are {stiffness_ratio} times as stiff as what lies below."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-layer": "a drop that goes deeper than the step in depth",
@@ -379,7 +379,7 @@ class GroundFriction(Effect):
     id = "ground-friction"
     family = "a force along the surface"
     equation = "|F_t| <= mu F_n"
-    source = "mu 0.13-0.85 in the literature on rollover and skid tests (M)"
+    source = "mu 0.13-0.85 in the literature on rollover and skid tests (recalled)"
     sentence = "Friction between structure and ground with mu = {coefficient}."
     rivals: ClassVar[Mapping[str, str]] = {"slope": "the lateral acceleration before contact: friction has none there"}
     acts = ("rollover",)

@@ -24,7 +24,7 @@ class Mass(Effect):
     kind: ClassVar[Kind] = "parameter"
     family = "a wrong inertia"
     equation = "m -> m + added"
-    source = "driver 75-100 kg (M)"
+    source = "driver 75-100 kg (recalled)"
     sentence = "The mass is {added:more|less} than was written down."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-gain": "the level at rest, which is m g, against a weighed mass",
@@ -53,7 +53,7 @@ class CentreOfMass(Effect):
     kind: ClassVar[Kind] = "parameter"
     family = "a wrong inertia"
     equation = "(y, z) -> (y + lateral, z + height)"
-    source = "loading, tyres, measurement by axle loads (M)"
+    source = "loading, tyres, measurement by axle loads (recalled)"
     sentence = "The centre of mass lies {height:higher|lower} and {lateral:further to the left|further to the right}."
     rivals: ClassVar[Mapping[str, str]] = {
         "inertia": "a static tilt test",
@@ -83,7 +83,7 @@ class Inertia(Effect):
     kind: ClassVar[Kind] = "parameter"
     family = "a wrong inertia"
     equation = "J -> scale J"
-    source = "estimates from the size of a vehicle, 10-20 % (M)"
+    source = "estimates from the size of a vehicle, 10-20 % (recalled)"
     sentence = "The moments of inertia are {scale} times what was written down."
     rivals: ClassVar[Mapping[str, str]] = {"centre-of-mass": "a static tilt test: inertia has no part in it"}
     acts = ("rollover",)

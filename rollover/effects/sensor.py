@@ -93,7 +93,7 @@ class SensorMisalignment(Effect):
     kind: ClassVar[Kind] = "sensor"
     family = "a sensor that points elsewhere"
     equation = "y = cos(angle) x + sin(angle) x_across; across: y for x, z for y, x for z, tangential for normal"
-    source = "mounting, 1-5 deg (M)"
+    source = "mounting, 1-5 deg (recalled)"
     sentence = "The sensor of {channel} is turned by {angle}."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-gain": "a motion across the channel: a gain reads nothing of it",
@@ -138,7 +138,7 @@ class SensorLag(Effect):
     kind: ClassVar[Kind] = "sensor"
     family = "a channel that comes late"
     equation = "y + tau y' + beta tau^2 y'' = x"
-    source = "CFC 60 cuts at 100 Hz, about 2 ms (M+)"
+    source = "CFC 60 cuts at 100 Hz, about 2 ms (recalled, fairly sure)"
     sentence = "{channel} lags by {time}: its edges are round."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-clock-offset": "a sharp edge: a lag rounds it, a clock only moves it",
@@ -185,7 +185,7 @@ class SensorScale(Effect):
     kind: ClassVar[Kind] = "sensor"
     family = "a channel read at a wrong scale"
     equation = "y = scale x"
-    source = "1-2 % for displacement sensors (M)"
+    source = "1-2 % for displacement sensors (recalled)"
     sentence = "{channel} reads {scale} times what is."
     rivals: ClassVar[Mapping[str, str]] = {
         "co-moving-mass": "the double integral of the acceleration against the displacement",
@@ -221,7 +221,7 @@ class SensorGain(Effect):
     kind: ClassVar[Kind] = "sensor"
     family = "a channel read at a wrong scale"
     equation = "y = gain x"
-    source = "1-5 % (M)"
+    source = "1-5 % (recalled)"
     sentence = "{channel} reads {gain} times what is."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-bias": "the level before contact, where a gain reads nothing",
@@ -258,7 +258,7 @@ class SensorClockOffset(Effect):
     kind: ClassVar[Kind] = "sensor"
     family = "a channel that comes late"
     equation = "y(t) = x(t - offset)"
-    source = "recorders that were started by hand or by a trigger of their own (M)"
+    source = "recorders that were started by hand or by a trigger of their own (recalled)"
     sentence = "{channel} comes {offset:late|early}."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-lag": "a sharp edge: a lag rounds it, a clock only moves it",
@@ -290,7 +290,7 @@ class SensorClockDrift(Effect):
     kind: ClassVar[Kind] = "sensor"
     family = "a channel that comes late"
     equation = "y(t) = x((1 - drift) t)"
-    source = "20-100 ppm for quartz (M+); more where two recorders were joined"
+    source = "20-100 ppm for quartz (recalled, fairly sure); more where two recorders were joined"
     sentence = "The clock of {channel} falls behind by {drift} of the time."
     rivals: ClassVar[Mapping[str, str]] = {"sensor-clock-offset": "two events far apart in time"}
     null: ClassVar[Mapping[str, float | None]] = {"drift": 0.0}

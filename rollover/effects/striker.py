@@ -14,7 +14,7 @@ from rollover.spec.vehicle import Striker
 
 AIR_DENSITY = 1.204  # kg/m3 at 20 degrees and 1013 hPa
 AIR_VISCOSITY = 1.51e-5  # m2/s
-CRITICAL = (1e5, 4e5)  # Reynolds numbers of the drag crisis of a sphere, rough and smooth (Achenbach, M+)
+CRITICAL = (1e5, 4e5)  # Reynolds numbers of the drag crisis of a sphere, rough and smooth (Achenbach, recalled)
 
 
 @parameters
@@ -30,7 +30,7 @@ class GuideFriction(Effect):
     id = "guide-friction"
     family = "a drag on the falling body"
     equation = "F = -F_c sign(v) along the guide, at rest as much of it as holds; with creep F = -F_c tanh(v/v_c)"
-    source = "20-200 N in drop rigs (M)"
+    source = "20-200 N in drop rigs (recalled)"
     sentence = "The guide brakes the striker with {force}."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-stiffness": "the free fall before contact: it is slower than g",
@@ -67,8 +67,9 @@ class AirDrag(Effect):
     family = "a drag on the falling body"
     equation = "F = -1/2 rho C_d A v |v|"
     source = (
-        "C_d of blunt bodies about 1 (M+); 60 N at 5 m/s on a tractor: as a rule not observable; C_d of a smooth "
-        "sphere 0.5, beyond Re 2e5 to 4e5 0.1 to 0.2 (Achenbach, J. Fluid Mech. 54, 1972; M+)"
+        "C_d of blunt bodies about 1 (recalled, fairly sure); 60 N at 5 m/s on a tractor: as a rule not observable; "
+        "C_d of a smooth sphere 0.5, beyond Re 2e5 to 4e5 0.1 to 0.2 (Achenbach, J. Fluid Mech. 54, 1972; recalled, "
+        "fairly sure)"
     )
     sentence = "The air brakes the fall like a blunt body of {area}."
     rivals: ClassVar[Mapping[str, str]] = {
@@ -119,7 +120,7 @@ class StructuralCompliance(Effect):
     id = "structural-compliance"
     family = "a body that is not rigid"
     equation = "S = k (x_body - x_nose) + c (v_body - v_nose)"
-    source = "load cells and bolted strikers, 1e6-1e8 N/m (M-)"
+    source = "load cells and bolted strikers, 1e6-1e8 N/m (recalled, unsure)"
     sentence = "The striker is compliant by {stiffness} between its nose and its body."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-lag": "a ringing after the first contact: a lag does not ring",

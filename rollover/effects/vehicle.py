@@ -21,7 +21,7 @@ class RopsElasticity(Effect):
     id = "rops-elasticity"
     family = "a compliant structure"
     equation = "k_i -> k_i stiffness / sum k_y; dashpots by its root"
-    source = "two-post frames about 0.3 MN/m at the top (M)"
+    source = "two-post frames about 0.3 MN/m at the top (recalled)"
     sentence = "The ROPS deflects by {stiffness} to the side."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-stiffness": "the deflection of the ROPS, which soft ground leaves alone",
@@ -59,7 +59,10 @@ class RopsPlasticity(Effect):
     id = "rops-plasticity"
     family = "a compliant structure"
     equation = "|F_i| <= F_y k_i / sum k"
-    source = "F_y 34 kN for a two-post frame of some 3 t (M); faster loading raises it (Cowper and Symonds, M+)"
+    source = (
+        "F_y 34 kN for a two-post frame of some 3 t (recalled); faster loading raises it (Cowper and Symonds; "
+        "recalled, fairly sure)"
+    )
     sentence = "The ROPS yields at {yield_force} to the side."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-stiffness": "the set that stays in the frame",
@@ -98,7 +101,7 @@ class TyreDamping(Effect):
     id = "tyre-damping"
     family = "a tyre that is not the one written down"
     equation = "c_z = damping"
-    source = "1-5 kN s/m for tractor tyres (M)"
+    source = "1-5 kN s/m for tractor tyres (recalled)"
     sentence = "Each tyre is damped by {damping}."
     rivals: ClassVar[Mapping[str, str]] = {"inertia": "a bounce on the spot", "axle-stop": "the angle of the axle"}
     acts = ("rollover",)
@@ -124,7 +127,7 @@ class TyreLateralStiffness(Effect):
     id = "tyre-lateral-stiffness"
     family = "a tyre that is not the one written down"
     equation = "k_y = stiffness"
-    source = "0.3-0.7 of the vertical stiffness (M)"
+    source = "0.3-0.7 of the vertical stiffness (recalled)"
     sentence = "Each tyre deflects laterally by {stiffness}."
     rivals: ClassVar[Mapping[str, str]] = {"centre-of-mass": "a static tilt test with the tyres blocked"}
     acts = ("rollover",)
@@ -151,7 +154,7 @@ class AxleStop(Effect):
     id = "axle-stop"
     family = "a joint that stops elsewhere"
     equation = "torque = stiffness (theta - angle) beyond the angle"
-    source = "stops at 8-15 deg (M)"
+    source = "stops at 8-15 deg (recalled)"
     sentence = "The front axle meets its stops at {angle}."
     rivals: ClassVar[Mapping[str, str]] = {"inertia": "the angle of the axle at the step in roll acceleration"}
     acts = ("rollover",)
@@ -214,7 +217,7 @@ class MountPlay(Effect):
     id = "mount-play"
     family = "a compliant structure"
     equation = "F = k (delta - clip(delta, +-gap))"
-    source = "5-15 mm in worn or silent-block mounts (M-)"
+    source = "5-15 mm in worn or silent-block mounts (recalled, unsure)"
     sentence = "The mounts of the ROPS have a play of {gap} before they bear."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-clock-offset": "the force against the deflection: play has a dead zone",
@@ -248,7 +251,7 @@ class TankSlosh(Effect):
     id = "tank-slosh"
     family = "a mass that moves in the vehicle"
     equation = "m (u'' + a_y - g_y) + 2 damping m w u' + m w^2 u = 0, w^2 = g/length"
-    source = "tanks of 0.8-1.2 m: 0.75-0.95 Hz, length 0.28-0.44 m, half of the liquid (computed); damping 0.5-5 % (M)"
+    source = "tanks of 0.8-1.2 m: 0.75-0.95 Hz, length 0.28-0.44 m, half of it (computed); damping 0.5-5 % (recalled)"
     sentence = "{mass} of liquid slosh across the vehicle like a pendulum of {length}."
     rivals: ClassVar[Mapping[str, str]] = {"payload-shift": "a tank filled to the brim, or another level"}
     acts = ("rollover",)
@@ -274,7 +277,7 @@ class PayloadShift(Effect):
     id = "payload-shift"
     family = "a mass that moves in the vehicle"
     equation = "m (u'' + a_y - g_y) = -mu N sign(u'), |u| <= travel"
-    source = "mu 0.2-0.5, 5-30 % of the mass (M)"
+    source = "mu 0.2-0.5, 5-30 % of the mass (recalled)"
     sentence = "{mass} of load slide by {travel} to the side before they meet a wall."
     rivals: ClassVar[Mapping[str, str]] = {
         "tank-slosh": "the load lashed down",
@@ -303,7 +306,7 @@ class DriveTorque(Effect):
     id = "drive-torque"
     family = "a moment on the chassis"
     equation = "M_y = -torque on the chassis; wheels that are held pass it on to the ground"
-    source = "rear upset; some kN m in a low gear (M-)"
+    source = "rear upset; some kN m in a low gear (recalled, unsure)"
     sentence = "The engine goes on driving with {torque} and lifts the front."
     rivals: ClassVar[Mapping[str, str]] = {"gyroscopic-rotor": "the clutch open with the engine running"}
     acts = ("rollover",)

@@ -86,7 +86,8 @@ def lines_of(path: Path, dialect: Dialect, *, blank: bool = False) -> Iterator[t
                 if (blank or line.strip()) and not (dialect.comment and line.startswith(dialect.comment)):
                     yield number, line.rstrip("\r\n")
         except UnicodeDecodeError as e:
-            refuse(path, f"not {dialect.encoding} text, got byte 0x{e.object[e.start]:02x}", number + 1)
+            what = f"not {dialect.encoding} text, got byte 0x{e.object[e.start]:02x}"
+            refuse(path, f"{what}; csv.encoding of a profile (--profile) names another, such as cp1252", number + 1)
 
 
 def cells_of(line: str, dialect: Dialect) -> list[str]:

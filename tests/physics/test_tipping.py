@@ -251,5 +251,5 @@ def test_above_the_static_limit_it_starts_from_rest() -> None:
 
 def test_away_from_the_slope_there_is_nothing_to_let_go() -> None:
     steep = load("side_overturn_slope").replaced({"ground.surface.angle_deg": 45.0, "initiation.side": "right"})
-    with pytest.raises(InputError, match=r"side or heading_deg so that it falls downhill"):
+    with pytest.raises(InputError, match=r"falls downhill, a flatter surface, or another initiation.kind"):
         run(steep)

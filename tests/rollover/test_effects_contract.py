@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import shutil
 import string
 import subprocess
@@ -143,6 +144,7 @@ def test_an_effect_tells_what_it_is(effect: type[Effect]) -> None:
     assert not (effect.__doc__ or "").startswith(f"{effect.__name__}(")
     for text in (effect.family, effect.equation, effect.source, effect.sentence):
         assert len(text) > 5, text
+    assert not re.search(r"[(;,] ?[HML][+-]?\)", effect.source), "how sure a source is stands there in words"
     assert set(effect.acts) <= {"drop", "rollover"}
     assert effect.acts
     assert all(is_known(channel) for channel in effect.channels), effect.channels

@@ -30,6 +30,7 @@ from tests.viz.picture import has_software_driver
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
 import notebooks  # noqa: E402
+import widths  # noqa: E402
 
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 FOLDERS = ("docs", "ground", "rollover", "viz", "scenarios", "tests")
@@ -225,6 +226,15 @@ def outputs(page: str) -> str:
     """Text and tags of all outputs of a page."""
     shown = re.findall(r'<div class="cell_output.*?(?=<div class="cell |</section>)', page, flags=re.DOTALL)
     return re.sub(r"</?span[^>]*>", "", html.unescape("\n".join(shown)))
+
+
+def test_long_names_break_behind_their_parts() -> None:
+    name = '<span class="pre">rops/mount/NAME/force_x</span>'
+    assert widths.breakable(name) == '<span class="pre">rops/<wbr>mount/<wbr>NAME/<wbr>force_<wbr>x</span>'
+    whole = '<a href="a/b_c.html">a/b</a> <span class="pre">--out</span> <span class="pre">0.5</span>'
+    assert widths.breakable(whole) == whole
+    line = '<div class="highlight-sh notranslate"><pre>run<span class="w"> </span>--no-half-step</pre></div>'
+    assert '<span class="w"> </span><span class="whole">--no-half-step</span></pre>' in widths.breakable(line)
 
 
 def test_a_page_is_a_notebook_with_its_blocks_as_cells() -> None:

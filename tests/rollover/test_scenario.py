@@ -53,6 +53,10 @@ ONE_FAULT: dict[str, tuple[str | bytes, str]] = {
         without("speed: 3.0", "speed: 3 km/h"),
         f"bad.yaml:8: initiation.speed: not a number, got text '3 km/h'; {SPEED} (the bare number, without its unit)",
     ),
+    "decimal comma": (
+        without("speed: 3.0", "speed: 3,5"),
+        f"bad.yaml:8: initiation.speed: not a number, got text '3,5'; {SPEED} (with a decimal point)",
+    ),
     "nan": (without("speed: 3.0", "speed: .nan"), f"bad.yaml:8: initiation.speed: not finite, got nan; {SPEED}"),
     "inf": (without("speed: 3.0", "speed: -.inf"), f"bad.yaml:8: initiation.speed: not finite, got -inf; {SPEED}"),
     "overflow": (without("speed: 3.0", "speed: 1e999"), f"bad.yaml:8: initiation.speed: not finite, got inf; {SPEED}"),

@@ -43,6 +43,15 @@ def test_account_of_a_vehicle(folder: Path) -> None:
     assert answer["code_6"]["confidence"] == "recalled, source not checked"
 
 
+@pytest.mark.parametrize(
+    ("vehicle", "said"), [("utility_tractor", "tractors, not of this one ("), ("vineyard_tractor", "tractors (")]
+)
+def test_the_limit_is_that_of_narrow_tractors(vehicle: str, said: str, tmp_path: Path) -> None:
+    done = rollover(vehicle, "--headings", 1, "--out", tmp_path / vehicle)
+    assert f"38 deg asked of narrow {said}recalled" in done.output.replace("\n", " ")
+    assert f"38 degrees asked of narrow {said}recalled" in (tmp_path / vehicle / "report.html").read_text()
+
+
 def test_page(folder: Path) -> None:
     page = (folder / "report.html").read_text()
     answer = json.loads((folder / "stability.json").read_text())

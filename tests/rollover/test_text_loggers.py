@@ -103,6 +103,7 @@ def test_rows_may_end_after_the_last_column_that_is_read(tmp_path: Path) -> None
         ("0,1\n1,2\n", r"channels.t: no such column in a.csv, got 't'; the file holds: 1, 2"),
         ("t,F,F\n0,1,2\n", r"channels.F: column given twice, got 'F'; one of 'F \(column 2\)', 'F \(column 3\)'"),
         (",,\n0,1\n", r"no such column"),
+        ("Bench 7\nt,F\n0,1\n", r"the file holds: Bench 7; where other rows stand above, csv.names_row says which"),
         ("t,F\n", r"empty"),
     ],
 )

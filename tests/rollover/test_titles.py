@@ -9,16 +9,19 @@ from typing import Any
 
 import pytest
 
-from rollover.assessment.shipped import origin
+from rollover.assessment.shipped import MOST_IN_WORDS, origin
 from rollover.scenario import AnyVehicle, load
 from rollover.spec import document
 from rollover.studies import load as load_study
+from viz.content.blocks import Details, Table
+from viz.content.differences import differences_section
 
 SHELF = document.shipped_folder()
 SCENARIOS = sorted(SHELF.glob("*.yaml"))
 VEHICLES = sorted((SHELF / "vehicles").glob("*.yaml"))
 STUDIES = sorted((SHELF / "studies").glob("*.yaml"))
 STANDARD = re.compile(r"\b(?:OECD )?(?:Code|ISO|SAE|EN) [A-Z]?\d+(?:-\d+)?")  # the number of a document is no value
+WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 FACTORS = (1.0, 1e3, 1e-3, 3.6, 1e6, 1e-6)  # a number in a title may stand in t, mm, km/h or kN
 
 
@@ -106,5 +109,29 @@ def test_what_differs_from_the_shipped_scenario(name: str, changes: dict[str, An
     assert found.in_words.startswith(f"Differs from the shipped {name}: {told[0][0]}: {told[0][1]} -> ")
 
 
+def test_another_frame_is_told_in_a_few_lines() -> None:
+    """Parts that only one of them has are told as one, and where numbers come from is no value."""
+    shipped = load("side_overturn")
+    found = origin(shipped.replaced({"vehicle.rops": "vehicles/rops/two_post_rear_tubes_3t.yaml"}))
+    assert found is not None
+    told = {d.path: (d.shipped, d.now) for d in found.differences}
+    assert told["vehicle.rops.mounts"] == ("left, right", "none")
+    assert told["vehicle.rops.feet"] == ("none", "left, right")
+    assert told["vehicle.rops.members.post_left"] == ("tube", "beam")
+    assert len(told) <= MOST_IN_WORDS
+    assert "provenance" not in found.in_words
+
+
 def test_a_title_of_ones_own_has_no_origin() -> None:
     assert origin(load("drop_test").replaced({"title": "My own drop"})) is None
+
+
+def test_a_page_folds_many_differences() -> None:
+    shipped = load("side_overturn")
+    few = {"vehicle.whole.mass": 3100.0}
+    many = {f"vehicle.wheels.{n}.tyre.{k}": 0.4 for n in WHEELS for k in ("radius", "width", "crown", "friction")}
+    ((_, table),) = [section.blocks for section in differences_section(shipped.replaced(few))]
+    ((_, folded),) = [section.blocks for section in differences_section(shipped.replaced(few | many))]
+    assert isinstance(table, Table)
+    assert isinstance(folded, Details)
+    assert folded.summary == "17 values"

@@ -91,7 +91,7 @@ def _stability(text: str) -> str:
     answer = {
         "headings": [{**row, "heading_deg": h} for h in (0.0, 90.0, 180.0, 270.0)],
         "least": {"balance_deg": 30.0, "heading_deg": 90.0},
-        "code_6": {"limit_deg": 38.0, "confidence": text},
+        "code_6": {"limit_deg": 38.0, "confidence": text, "applies": True},
         "losses": [{"part": text, "mass": 1.0, "without_deg": 31.0, "with_deg": 30.0, "share": 0.03}],
         "effects_left_out": [text],
         "vehicle": text,

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from viz.figures import plots
-from viz.figures.heat_map import heat_map
+from viz.figures.heat_map import DARK, DEEP, INK, PAPER, WHITE, heat_map
 from viz.figures.plots import COLOURS, Curve, Level, Outline, View, thinned
 from viz.figures.reading import MOST_POINTS
 from viz.figures.svg import number_label
@@ -164,3 +164,28 @@ def test_what_is_read_in_a_figure_keeps_its_digits() -> None:
     grid = [np.repeat(levels[0], 2), np.tile(levels[1], 2)]
     drawn = heat_map(*grid, np.arange(4.0), across="gap, m", up="speed, m/s", label="kN")
     assert {"0.0125", "0.0375", "1.125", "2.375"} <= set(re.findall(r"<text[^>]*>([^<]*)</text>", drawn))
+
+
+def test_numbers_on_a_map_are_read_on_their_cells() -> None:
+    """Ratio of contrast by WCAG 2, (L1 + 0.05)/(L2 + 0.05), L of linear sRGB: the better of white and ink is taken."""
+
+    def luminance(rgb: NDArray[np.float64]) -> float:
+        linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+        return float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05
+
+    def rgb(colour: str) -> NDArray[np.float64]:
+        return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
+
+    values = np.linspace(0.0, 9.0, 10)
+    drawn = heat_map(values, np.zeros(10), values, across="a", up="b", label="c")
+    numbers = re.findall(r"font-size: 7px; text-anchor: middle; fill: ([^\"]*)\"[^>]*>(\d)<", drawn)
+    assert [int(n) for fill, n in numbers if WHITE in fill] == [v for v in values if v > DARK * 9.0]
+    assert len(numbers) == values.size
+    assert not any("var(" in fill for fill, _ in numbers), "cells stay as they are on a dark page, and so must they"
+    paper, dark, ink = rgb(PAPER), rgb(DEEP), luminance(rgb(INK))
+    for share in np.linspace(0.0, 1.0, 101):
+        cell = luminance(paper + (dark - paper) * share)
+        white = share > DARK
+        taken, other = (1.05 / cell, cell / ink) if white else (cell / ink, 1.05 / cell)
+        assert taken > 3.8
+        assert taken > other - 0.1

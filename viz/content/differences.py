@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rollover.assessment.shipped import origin
+from rollover.assessment.shipped import MOST_IN_WORDS, origin
 from rollover.scenario import Scenario
-from viz.content.blocks import Block, Note, Section, Table
+from viz.content.blocks import Block, Details, Note, Section, Table
 
 
 def differences_section(scenario: Scenario) -> list[Block]:
@@ -14,7 +14,9 @@ def differences_section(scenario: Scenario) -> list[Block]:
         return []
     rows = [[d.path, d.shipped, d.now] for d in made_from.differences]
     note = Note(text=f"The title is that of the shipped {made_from.name}; these values are not its own.", warning=True)
-    table = Table(columns=["value", "shipped", "now"], rows=rows)
+    table: Block = Table(columns=["value", "shipped", "now"], rows=rows)
+    if len(rows) > MOST_IN_WORDS:  # so many are a scenario of its own; the answer does not wait below them
+        table = Details(summary=f"{len(rows)} values", blocks=[table])
     return [Section(title=f"Differs from the shipped {made_from.name}", blocks=[note, table])]
 
 

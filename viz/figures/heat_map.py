@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 from viz.figures.plots import COLOURS, canvas, finish, shades
 from viz.figures.svg import number_label
 
-PAPER, WHITE = "#dfeaf6", "#ffffff"  # of the least value and of numbers on dark cells
+# cells and their numbers are the same on a dark page: none of these is a colour of `COLOURS`, which the page turns
+PAPER, DEEP, OPPOSITE = "#dfeaf6", "#1f5fa9", "#c4600d"  # of the least value, the largest, the least signed one
+WHITE, INK = "#ffffff", "#22272f"  # of numbers on dark cells and on others
+DARK = 0.735  # share of the way to `DEEP` from where white is read better than ink, by the ratios of WCAG: 3.9 for both
+DARK_SIGNED = 0.94  # the same on the way to `OPPOSITE`, which is lighter
 MOST_NUMBERS = 120  # cells up to which each carries its number
 MOST_LETTERS = 36  # side by side below a map: a letter of 9 points is 0.07 inches wide, the map 2.6
 
@@ -38,16 +42,17 @@ def heat_map(
     low, high = span or ((-1.0, 1.0) if signed else (float(np.nanmin(cells)), float(np.nanmax(cells))))
     with canvas(4.6, 3.2) as (figure, svg):
         axes = figure.add_subplot()
-        colours = shades(COLOURS["second"], PAPER, COLOURS["first"]) if signed else shades(PAPER, COLOURS["first"])
+        colours = shades(OPPOSITE, PAPER, DEEP) if signed else shades(PAPER, DEEP)
         mesh = axes.pcolormesh(cells, cmap=colours, vmin=low, vmax=high, edgecolors=COLOURS["grid"], linewidth=0.4)
         for (i, j), value in np.ndenumerate(cells):
             if not np.isfinite(value):
                 axes.plot([j + 0.5], [i + 0.5], ls="", marker="x", color=COLOURS["limit"])
             elif cells.size <= MOST_NUMBERS:
-                dark = high > low and (abs(value) > 0.5 if signed else value > 0.5 * (low + high))
+                dark = high > low and (value > DARK if signed else value - low > DARK * (high - low))
+                dark = dark or (signed and value < -DARK_SIGNED)
                 axes.text(
                     j + 0.5, i + 0.5, number_label(value, values, 3), ha="center", va="center", fontsize=7,
-                    color=WHITE if dark else COLOURS["ink"],
+                    color=WHITE if dark else INK,
                 )  # fmt: skip
         for axis, levels in ((axes.xaxis, columns), (axes.yaxis, rows)):
             step = max(1, -(-len(levels) // 12))

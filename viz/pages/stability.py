@@ -39,11 +39,13 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
     least = answer["least"]
     below = least["balance_deg"] < limit["limit_deg"]
     word = "below" if below else "not below"
+    of_this = "" if limit["applies"] else ", not of this one"
     head = Headline(
         sentence=f"It stands on slopes of up to {least['balance_deg']:.1f} degrees, whichever way it faces; "
         f"the weakest heading is {least['heading_deg']:g} degrees.",
-        detail=f"This is {word} the {limit['limit_deg']:g} degrees asked of narrow tractors ({limit['confidence']}).",
-        state="warn" if below else "",
+        detail=f"This is {word} the {limit['limit_deg']:g} degrees asked of narrow tractors{of_this} "
+        f"({limit['confidence']}).",
+        state="warn" if below and limit["applies"] else "",
     )
     blocks: list[Block] = [
         Section(

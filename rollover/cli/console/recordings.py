@@ -159,7 +159,8 @@ def stability(answer: Mapping[str, Any], folder: str) -> None:
     least, limit = answer["least"], answer["code_6"]
     verdict = "below" if least["balance_deg"] < limit["limit_deg"] else "not below"
     angle, heading = f"{least['balance_deg']:.2f} deg", f"heading {least['heading_deg']:g}"
-    asked = f"{limit['limit_deg']:g} deg asked of narrow tractors ({limit['confidence']})"
+    of_this = "" if limit["applies"] else ", not of this one"
+    asked = f"{limit['limit_deg']:g} deg asked of narrow tractors{of_this} ({limit['confidence']})"
     out.print(f"Least static stability angle {angle}, at {heading}: {verdict} the {asked}.", style="bold")
     table = Table(box=None, pad_edge=False)
     for heading in ("heading", "lift-off", "pivot ends", "on stop", "overturns", "stiff: pivot", "stiff: stop"):

@@ -44,7 +44,8 @@ def sniff(path: Path) -> bool:
 def read(path: Path, profile: Described | None) -> Recording:
     """Recording of a text table by a profile, SI. Raises `InputError`."""
     if profile is None or not isinstance(profile.about, Profile):
-        message = f"no sidecar, got no {path.stem}.yaml beside it; write one, or say with --profile how to read it"
+        cure = "write one, or say with --profile how to read it (rollover new profile)"
+        message = f"no sidecar, got no {path.stem}.yaml beside it; {cure}"
         raise InputError(Fault(file=str(path), message=message))
     dialect, notes = _dialect(path, profile)
     names, between = csv_heading(path, dialect)
@@ -56,7 +57,13 @@ def read(path: Path, profile: Described | None) -> Recording:
     _refuse_twins(profile, names)
     nothing = Signal(values=np.empty(0))
     if not set(profile.columns) <= set(names):
-        return assemble(path, dict.fromkeys(names, nothing), profile)  # which refuses it
+        try:
+            return assemble(path, dict.fromkeys(names, nothing), profile)  # which refuses it
+        except InputError as e:
+            if how.names_row is not None or not set(profile.columns).isdisjoint(names):
+                raise
+            cure = "where other rows stand above, csv.names_row says which one holds the names"
+            raise InputError(*(replace(fault, message=f"{fault.message}; {cure}") for fault in e.faults)) from None
     wanted = list(profile.columns)
     first = dict(zip(names, next(iter(first_rows(path, dialect, 1)), []), strict=False))
     stamps = {name: column for name, column in profile.columns.items() if _is_stamp(column, first.get(name, ""))}

@@ -17,6 +17,7 @@ from rollover.spec.document.slot import Slot, slot_of, slots
 from rollover.spec.document.tree import Node, Place
 from rollover.system.errors import Fault, InputError, hint
 
+_DECIMAL_COMMA = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
 _NUMBER_FIRST = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*")
 _FIELD_FIRST = re.compile(r"([A-Za-z_][\w.]*): (.*)", re.DOTALL)
 
@@ -145,7 +146,9 @@ def _spelling(value: Any) -> str:
     number = _NUMBER_FIRST.match(value) if isinstance(value, str) else None
     if number is None:
         return ""
-    return " (without quotes)" if number.end() == len(value) else " (the bare number, without its unit)"
+    if number.end() == len(value):
+        return " (without quotes)"
+    return " (with a decimal point)" if _DECIMAL_COMMA.fullmatch(value) else " (the bare number, without its unit)"
 
 
 class _Where:
