@@ -16,7 +16,7 @@ from rollover.diagnosis.fit.finite_differences import (
     stencil,
     time_derivative,
 )
-from rollover.diagnosis.fit.parameterisation import Candidate, key_at, with_slices
+from rollover.diagnosis.fit.parameterisation import Candidate, Key, key_at, with_slices
 from rollover.diagnosis.forward.full_run import full_runs, made_ahead, perturbations_of
 from rollover.diagnosis.settings import SETTINGS
 from rollover.system.processes import Children
@@ -37,7 +37,7 @@ class Simulations:
         self.simulations = 0
         self._fixed_shifts = False
         self._raw, self._known = Memory(), Memory()
-        self._discontinuities: dict[tuple[object, ...], NDArray[np.int64]] = {}
+        self._discontinuities: dict[Key, NDArray[np.int64]] = {}
 
     def with_noise_model(self, dataset: Sequence[Dataset]) -> None:
         """Take the same recordings under another noise model: nothing is simulated again."""
@@ -100,19 +100,27 @@ class Simulations:
     def predicted(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         """Stacked prediction of recording r; None where the simulation fails or a value is out of bounds."""
         key = key_at(r, candidates, x, shift)
-        if key not in self._known:
-            raw = self.raw(r, candidates, x, shift)
-            self._known[key] = None if raw is None else self.dataset[r].whitened(raw)
-        return self._known[key]
+        return self._whitened(key, self._raw_at(key, candidates, x, shift))
 
     def raw(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         """The same in SI, before the noise comes in."""
-        if (key := key_at(r, candidates, x, shift)) not in self._raw:
-            self._raw[key] = self._simulated(r, candidates, x, shift)
+        return self._raw_at(key_at(r, candidates, x, shift), candidates, x, shift)
+
+    def _whitened(self, key: Key, raw: Array | None) -> Array | None:
+        """A prediction of a key, `raw` in SI, whitened."""
+        if key not in self._known:
+            self._known[key] = None if raw is None else self.dataset[key[0]].whitened(raw)
+        return self._known[key]
+
+    def _raw_at(self, key: Key, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+        """What `raw` is where that has this key."""
+        if key not in self._raw:
+            self._raw[key] = self._simulated(key, candidates, x, shift)
         return self._raw[key]
 
-    def _simulated(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+    def _simulated(self, key: Key, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         self.simulations += 1
+        r = key[0]
         found = self._made(r, candidates, x, shift)
         if found is None:
             return None
@@ -121,7 +129,7 @@ class Simulations:
             return y
         discontinuities = self.dataset[r].discontinuities(y, predicted)
         if discontinuities.size:
-            self._discontinuities[key_at(r, candidates, x, shift)] = discontinuities
+            self._discontinuities[key] = discontinuities
         return self.dataset[r].masked(y, discontinuities)
 
     def predicted_with_jumps(
@@ -166,7 +174,8 @@ class Simulations:
         A jump that moves past a sample is no slope, and what is forgiven there follows the measurement. With `slope`,
         dy/dtau (n,) before, SI, the two are compared as a clock would have them, see `clock_aligned_difference`.
         """
-        first, last = self.raw(r, *before, shift), self.raw(r, *after, shift)
+        keys = key_at(r, *before, shift), key_at(r, *after, shift)
+        first, last = (self._raw_at(key, *point, shift) for key, point in zip(keys, (before, after), strict=True))
         if first is None or last is None:
             return None
         if slope is not None:
@@ -174,10 +183,11 @@ class Simulations:
                 self.dataset[r], first, last, slope, lambda d: self.predicted_with_jumps(r, *after, shift + d)
             )
         d = last - first
-        for point in (before, after):
-            d[self._discontinuities.get(key_at(r, *point, shift), NONE)] = 0.0
+        for key in keys:
+            if key in self._discontinuities:
+                d[self._discontinuities[key]] = 0.0
         e = self.dataset[r]
-        discontinuities = self._discontinuities.get(key_at(r, *before, shift), NONE)
+        discontinuities = self._discontinuities.get(keys[0], NONE)
         return e.marginalised_beside(discontinuities)(e.worth(discontinuities) * e.whitened(d))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.cache import NONE, Simulations
-from rollover.diagnosis.fit.finite_differences import Point, adaptive_difference, moved_to, ridge_at, step_reduced
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, bounded_step, time_shift_step, total_of
-from rollover.diagnosis.fit.parameterisation import Candidate, key_at
-from rollover.diagnosis.noise.ensemble import heavy_tail
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.residual_block import Blocks
 from rollover.diagnosis.noise.truncation import shortly_after_impact
 from rollover.diagnosis.settings import SETTINGS
 
@@ -22,14 +20,12 @@ Array = NDArray[np.float64]
 TUNING = SETTINGS.fit.levenberg_marquardt
 
 
-class Problem(Simulations):
+class Problem(Blocks):
     """Recordings held against what is simulated of them."""
 
     def __init__(self, dataset: Sequence[Dataset]) -> None:
         super().__init__(dataset)
-        self.measured = [e.measured() for e in self.dataset]
         self.shifts = [0.0] * len(self.dataset)
-        self.heavy_tailed = True  # whether a recording may have taken another course than its run
         self._near: Problem | None = None
 
     def no_jacobian(self) -> Problem:
@@ -37,11 +33,6 @@ class Problem(Simulations):
         other = Problem(self.dataset)
         other.shifts = list(self.shifts)
         return other
-
-    def with_noise_model(self, dataset: Sequence[Dataset]) -> None:
-        """Take the same recordings with another noise: nothing is simulated again, fits must be made anew."""
-        super().with_noise_model(dataset)
-        self.measured = [e.measured() for e in self.dataset]
 
     def near(self) -> Problem:
         """One that sees of the same recordings what comes `shortly_after_impact`; itself where none goes on long."""
@@ -120,72 +111,6 @@ class Problem(Simulations):
         """Measured less predicted, stacked, SI, of each recording."""
         raws = [self.raw(r, fitted.candidates, fitted.x, b.shift) for r, b in enumerate(fitted.blocks)]
         return [np.zeros(e.count) if y is None else e.values - y for e, y in zip(self.dataset, raws, strict=True)]
-
-    def block(
-        self,
-        r: int,
-        candidates: Sequence[Candidate],
-        x: Sequence[float],
-        shift: float,
-        fd_step: float,
-        known: Array | None = None,
-        *,
-        clock: bool = True,
-    ) -> ResidualBlock | None:
-        """Recording r linearised at x by differences over `fd_step`: no Jacobian for 0, no time slope without `clock`.
-
-        `known` (n, k) are the first k columns of the Jacobian where those of an earlier place will do.
-        """
-        y = self.predicted(r, candidates, x, shift)
-        if y is None:
-            return None
-        e, raw = self.dataset[r], self.raw(r, candidates, x, shift)
-        assert raw is not None
-        discontinuities = self._discontinuities.get(key_at(r, candidates, x, shift), NONE)
-        J = np.zeros((y.size, len(x)))
-        if known is not None:
-            J[:, : known.shape[1]] = known
-        clock = clock and self.effort.is_timed and not (self._fixed_shifts and e.recording.clock.zero != "unknown")
-        slope = np.zeros_like(raw)
-        if clock:
-            slope = self._time_derivative(r, candidates, x, shift, raw)
-
-        worth = e.worth(discontinuities)
-        marginalised = e.marginalised_beside(discontinuities)
-        residual = marginalised(worth * (self.measured[r] - y))
-        far = max(1.0, float(np.sqrt(np.mean(residual * residual)))) if 0.0 < fd_step <= self.effort.fine else np.inf
-        far = far if far < TUNING.local_slopes_below else np.inf  # a wide step bridges local minima
-
-        def off(end: Point) -> Array | None:
-            return self.moved(r, (candidates, x), end, shift, None if self._fixed_shifts else slope)
-
-        def off_by(k: int) -> Callable[[float], Array | None]:
-            at = (candidates, x)
-            return lambda step: self.moved(r, at, (candidates, moved_to(at, k, x[k] + step)), shift)
-
-        for k in range(0 if known is None else known.shape[1], len(x) if fd_step else 0):
-            if self.effort.wide:
-                widest = 0.0 if self._fixed_shifts else self.effort.wide  # a first fit is short
-                column = adaptive_difference(e, off, (candidates, x), k, fd_step, widest)
-                if column is None:
-                    return None
-                ridge = ridge_at((candidates, x), k)
-                J[:, k] = column if ridge is None else column - ridge[1] * J[:, ridge[0]]
-                continue
-            column = step_reduced(off_by(k), fd_step if x[k] < 0.5 else -fd_step, far)
-            if column is None:
-                return None
-            J[:, k] = column
-        slope[discontinuities] = 0.0
-        slope = marginalised(worth * e.whitened(slope)) if clock else slope
-        counts = heavy_tail(e, residual) if self.heavy_tailed else None
-        if counts is not None:
-            residual, J, slope = counts.samples * residual, counts.samples[:, None] * J, counts.samples * slope
-        return ResidualBlock(
-            residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, heavy_tail=counts,
-            expected=e.expected,
-            masked=self.heavy_tailed,
-        )  # fmt: skip
 
     def clocked(
         self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, rounds: int

@@ -18,6 +18,7 @@ from rollover.effects import EFFECTS, Search, nth
 
 Array = NDArray[np.float64]
 
+Key = tuple[int, tuple[object, ...], tuple[float, ...], float]
 TUNING = SETTINGS.fit.parameterisation
 LIMIT_NAMES = ("limit", "yield_force", "stiffness", "angle")  # what acts the more the lower it is
 
@@ -294,7 +295,7 @@ def physical(x: float, search: Search) -> float:
     return float(search.low + x * (search.high - search.low))
 
 
-def key_at(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:
+def key_at(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Key:
     """What tells a simulation of recording r at x from any other, its time shift (s) to the nanosecond."""
     return (r, tuple([c.token for c in candidates]), tuple([round(float(v), 12) for v in x]), round(shift, 9))
 

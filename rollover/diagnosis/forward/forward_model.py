@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from functools import cached_property, lru_cache
@@ -22,7 +23,22 @@ from rollover.spec.document import Itself, exchanged
 from rollover.spec.initiation import Drop
 
 T = TypeVar("T")
+Store = OrderedDict[tuple[Any, ...], T]
 TUNING = SETTINGS.forward.drop
+OF_SENSORS = f"effects.{SENSORS}"
+
+
+class Exchanged:
+    """Values exchanged by path, and the key that they are known by."""
+
+    __slots__ = ("key", "values")
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self.values = values
+        self.key = tuple(sorted(values.items())) if len(values) > 1 else tuple(values.items())
+
+
+NOTHING = Exchanged({})
 
 
 class DropSimulator:
@@ -34,21 +50,25 @@ class DropSimulator:
         self.model = DropModel(scenario=scenario)
         self.recording = recording
         self.discontinuities = discontinuities  # whether it says how far channels jump
-        self._raw: dict[tuple[Any, ...], dict[str, Array]] = {}
-        self._models: dict[tuple[Any, ...], DropModel] = {}
-        self._tracks: dict[tuple[Any, ...], Track] = {}
+        # a dict's first key is behind all that were let go of before it
+        self._raw: Store[dict[str, Array]] = OrderedDict()
+        self._models: Store[DropModel] = OrderedDict()
+        self._tracks: Store[Track] = OrderedDict()
+        self._read_by: Store[Mapping[str, Any]] = OrderedDict()
 
     def __getstate__(self) -> dict[str, Any]:
         """What is sent to another process: not the runs."""
         no_jacobian = DropModel(scenario=self.model.scenario)
-        stores: dict[str, Any] = {"_raw": {}, "_models": {}, "_tracks": {}}
+        stores: dict[str, Any] = {name: OrderedDict() for name in ("_raw", "_models", "_tracks", "_read_by")}
         return {"model": no_jacobian, "recording": self.recording, "discontinuities": self.discontinuities, **stores}
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
-        physical = {path: value for path, value in changes.items() if not path.startswith(f"effects.{SENSORS}")}
-        read_by = self._model({path: value for path, value in changes.items() if path not in physical})
-        sensors = {name: e for name, e in read_by.scenario.effects.items() if name.startswith(SENSORS)}
+        moves: dict[str, Any] = {}
+        reads: dict[str, Any] = {}
+        for path, value in changes.items():
+            (reads if path.startswith(OF_SENSORS) else moves)[path] = value
+        physical, sensors = Exchanged(moves), self._sensors(Exchanged(reads))
         try:
             channels = self._run(physical, self.rows.times, shift)
             if sensors:
@@ -81,13 +101,19 @@ class DropSimulator:
     def state(self, shift: float) -> Mapping[str, Array]:
         """See `Simulator`."""
         try:
-            return self._model({}).motion(self.recording.time - shift)
+            return self._model(NOTHING).motion(self.recording.time - shift)
         except DropFailedError:
             return {}
 
-    def _discontinuities(
-        self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]
-    ) -> dict[str, Array]:
+    def _sensors(self, reads: Exchanged) -> Mapping[str, Any]:
+        """Effects of sensors with values exchanged, by name."""
+        if reads.key not in self._read_by:
+            effects = self._model(reads).scenario.effects
+            found = {name: e for name, e in effects.items() if name.startswith(SENSORS)}
+            self._keep(self._read_by, reads.key, found, TUNING.cached_predictions)
+        return self._read_by[reads.key]
+
+    def _discontinuities(self, physical: Exchanged, shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """How far channels that nothing smooths jump about each stamp, under `DISCONTINUITY_IN` and their names."""
         time = self.recording.time
         instants, rows = self._track(physical, float(time[-1] - shift) if time.size else 0.0).jumps
@@ -101,7 +127,7 @@ class DropSimulator:
             if sizes.any()
         }
 
-    def _edges(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
+    def _edges(self, physical: Exchanged, shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a jump lies between the rows."""
         lags, offsets, drifts = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
         found = {}
@@ -139,29 +165,28 @@ class DropSimulator:
         below = self.model.motion(times)["ground/sinkage"] > 0.0
         return float(times[np.argmax(below)]) if below.any() else np.inf
 
-    def _run(
-        self, physical: Mapping[str, Any], times: Array, shift: float, key: tuple[Any, ...] = ()
-    ) -> dict[str, Array]:
+    def _run(self, physical: Exchanged, times: Array, shift: float, key: tuple[Any, ...] = ()) -> dict[str, Array]:
         """The drop before instruments at `times` less `shift`, which `key` stands for beside it."""
-        values = (*sorted(physical.items()), *key, shift)
-        if values not in self._raw:
+        values = (*physical.key, *key, shift)
+        found = self._raw.get(values)
+        if found is None:
             at = times - shift
             rows = self._track(physical, float(at[-1]) if at.size else 0.0).rows(at)
-            self._keep(self._raw, values, channels_of(rows, self.recording.channels), TUNING.cached_predictions)
-        return self._raw[values]
-
-    def _track(self, physical: Mapping[str, Any], until: float) -> Track:
-        """The fall with values exchanged, at least up to a time (s): neither a clock nor a sensor asks for another."""
-        key = tuple(sorted(physical.items()))
-        found = self._tracks.pop(key, None)
-        if found is None or found.until < until:
-            found = self._model(physical).track(until + TUNING.track_margin)
-        self._keep(self._tracks, key, found, TUNING.cached_tracks)
+            found = channels_of(rows, self.recording.channels)
+            self._keep(self._raw, values, found, TUNING.cached_predictions)
         return found
 
-    def _model(self, changes: Mapping[str, Any]) -> DropModel:
+    def _track(self, physical: Exchanged, until: float) -> Track:
+        """The fall with values exchanged, at least up to a time (s): neither a clock nor a sensor asks for another."""
+        found = self._tracks.pop(physical.key, None)
+        if found is None or found.until < until:
+            found = self._model(physical).track(until + TUNING.track_margin)
+        self._keep(self._tracks, physical.key, found, TUNING.cached_tracks)
+        return found
+
+    def _model(self, exchange: Exchanged) -> DropModel:
         """The drop with values exchanged, its steps as short as it asks for."""
-        key = tuple(sorted(changes.items()))
+        key, changes = exchange.key, exchange.values
         if key not in self._models:
             own = exchanged(self.model.scenario, changes) if changes else self.model.scenario
             has_own = own.ground.law.advance is not None  # states of its own are second order in the step
@@ -172,10 +197,10 @@ class DropSimulator:
         return self._models[key]
 
     @staticmethod
-    def _keep(store: dict[tuple[Any, ...], T], key: tuple[Any, ...], value: T, most: int) -> None:
+    def _keep(store: Store[T], key: tuple[Any, ...], value: T, most: int) -> None:
         """Put into a store of the last so many."""
         if len(store) >= most:
-            store.pop(next(iter(store)))
+            store.popitem(last=False)
         store[key] = value
 
 

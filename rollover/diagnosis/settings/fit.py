@@ -135,6 +135,9 @@ class Notebook:
     """Kept predictions."""
 
     most_bytes: int = 5 * 10**8  # bytes: memory of kept predictions; chosen
+    most_linearised: int = (
+        256  # kept Jacobians: of six drops a fourth is asked for again, four in five of these within it; chosen
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
