@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
+import os
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -291,6 +293,24 @@ def test_a_recording_is_written_whole_or_not_at_all(
         log.write_rrd(overturn, path)
     assert [p.name for p in tmp_path.iterdir()] == ["run.rrd"]
     assert path.read_bytes() == b"before"
+
+
+def test_no_thread_of_the_recorder_meets_a_full_disk(
+    overturn: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would end without a word, and its recorder wait for it: the file is written by this process alone."""
+    (path := tmp_path / "run.rrd").write_bytes(b"before")
+    monkeypatch.setattr(rr.RecordingStream, "save", None)
+    monkeypatch.setattr(Path, "write_bytes", refused)
+    with pytest.raises(OSError, match=os.strerror(errno.ENOSPC)):
+        log.write_rrd(overturn, path)
+    assert [p.name for p in tmp_path.iterdir()] == ["run.rrd"]
+    assert path.read_bytes() == b"before"
+
+
+def refused(path: Path, data: bytes) -> int:
+    assert data.startswith(b"RRF2")
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
 
 def test_mistakes_are_errors_and_not_warnings(overturn: Run, tmp_path: Path) -> None:
