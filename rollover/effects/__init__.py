@@ -40,8 +40,12 @@ MOST = 3  # sensor effects of one id in a scenario, each on its own channel
 
 def effects() -> dict[str, type[Effect]]:
     """Every effect that exists, by its id; those of one's own files last. Raises `InputError`."""
-    own_code.load("effects", _wrong)
-    return {each: effect for each, effect in EFFECTS.items() if is_current(effect)}
+    try:
+        own_code.load("effects", _wrong)
+    finally:
+        for stale in [each for each, effect in EFFECTS.items() if not is_current(effect)]:
+            del EFFECTS[stale]
+    return dict(EFFECTS)
 
 
 def _wrong(module: ModuleType) -> str:

@@ -13,7 +13,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import coordinate
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN
-from rollover.diagnosis.forward.forward_model import DropSimulator, set_up, simulator_of
+from rollover.diagnosis.forward.forward_model import DropSimulator, Exchanged, set_up, simulator_of
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import DropModel
@@ -119,7 +119,7 @@ def test_a_discontinuous_force_term_takes_the_shortest_steps(
     """Roots of 30 kN/m that tear at 50 mm are 0.5 mm off at 2 ms, 0.01 mm at 0.2 ms: the kernel knows of no jump."""
     monkeypatch.setattr(Empirical, "is_smooth", is_smooth)
     _, recording = recorded({}, speeds=(2.0,))[0]
-    made = DropSimulator(scenario(), recording)._model({"effects.empirical.first_force": force})
+    made = DropSimulator(scenario(), recording)._model(Exchanged({"effects.empirical.first_force": force}))
     assert made.step == step
 
 

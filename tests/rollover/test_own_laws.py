@@ -165,4 +165,6 @@ def test_a_refused_file_leaves_nothing_behind(kind: str, tmp_path: Path, monkeyp
     chosen = {"ground.law": {"kind": "weed", "stiffness": 2e4}} if kind == "laws" else {f"effects.{made.id}": {}}
     assert load("drop_test").replaced(chosen).title
     assert kept.value.faults
+    monkeypatch.delenv(own_code.KINDS[kind])
     del sys.modules[made.__module__]
+    assert not [each for each in table() if "weed" in each]

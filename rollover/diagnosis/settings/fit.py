@@ -135,9 +135,8 @@ class Notebook:
     """Kept predictions."""
 
     most_bytes: int = 5 * 10**8  # bytes: memory of kept predictions; chosen
-    most_linearised: int = (
-        256  # kept Jacobians: of six drops a fourth is asked for again, four in five of these within it; chosen
-    )
+    # 1: kept Jacobians; of six drops a fourth is asked for again, four in five of these within it; chosen
+    most_linearised: int = 256
 
 
 @dataclass(frozen=True, kw_only=True)
