@@ -12,6 +12,7 @@ from ruamel.yaml import YAML
 
 from rollover.scenario import load
 from rollover.spec import document
+from rollover.spec.document import tree
 from rollover.spec.document.tree import Place
 from rollover.system.errors import InputError
 
@@ -77,3 +78,10 @@ def test_a_number_of_any_base_is_one_line(number: str, tmp_path: Path) -> None:
         load(tmp_path / "s.yaml")
     (line,) = str(caught.value).splitlines()
     assert line.startswith(f"{tmp_path / 's.yaml'}:2: vehicle.mass: not a number, got text '0")
+
+
+@pytest.mark.parametrize("text", ["", "''", "_", "maybe", "0b2", "1:2:x", ".", "+", "1" * 5000])
+@pytest.mark.parametrize("tag", ["int", "float", "bool", "null"])
+def test_a_stated_tag_that_its_text_is_none_of_leaves_text(tag: str, text: str) -> None:
+    value = tree.parse(f"a: !!{tag} {text}\n", PLACE).plain["a"]
+    assert value == text.strip("'") or tag == "null" or isinstance(value, float)

@@ -194,7 +194,7 @@ class _Builder:
                 value: Scalar = self.scalars.construct_object(node, deep=True)
                 if isinstance(value, int):
                     str(value)  # a base of 16 has no most digits when it is read, but none of it can be written
-            except ValueError:
+            except (LookupError, ValueError):  # a stated tag that the text is none of, or that has none
                 return str(node.value)
             return value
         if name not in ("str", "timestamp", "merge", "value"):
