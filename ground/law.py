@@ -175,10 +175,12 @@ def laws() -> dict[str, type[GroundLaw]]:
 
 
 def is_current(kind: type) -> bool:
-    """Whether a class is the one that its module holds: not of a file that failed, or of an earlier import of it."""
+    """Whether a class is of a module that is loaded, which holds no other one by its name.
+
+    One of a file that failed to import, or of an earlier import of it, is not; one that was made by ``type`` is.
+    """
     module = sys.modules.get(kind.__module__)
-    is_inner = "." in kind.__qualname__
-    return module is not None and (is_inner or getattr(module, kind.__name__, None) is kind)
+    return module is not None and getattr(module, kind.__name__, kind) is kind
 
 
 def evaluate(law: GroundLaw, z: float, v: float = 0.0, *, speed: float, mass: float = REFERENCE_MASS) -> float:
