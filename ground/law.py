@@ -175,12 +175,14 @@ def laws() -> dict[str, type[GroundLaw]]:
 
 
 def is_current(kind: type) -> bool:
-    """Whether a class is of a module that is loaded, which holds no other one by its name.
+    """Whether a class is of a module that is loaded, which has no other one of its own by that name.
 
     One of a file that failed to import, or of an earlier import of it, is not; one that was made by ``type`` is.
     """
     module = sys.modules.get(kind.__module__)
-    return module is not None and getattr(module, kind.__name__, kind) is kind
+    held = getattr(module, kind.__name__, None)
+    is_replaced = isinstance(held, type) and held is not kind and held.__module__ == kind.__module__
+    return module is not None and not is_replaced
 
 
 def evaluate(law: GroundLaw, z: float, v: float = 0.0, *, speed: float, mass: float = REFERENCE_MASS) -> float:

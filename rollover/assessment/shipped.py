@@ -58,15 +58,14 @@ def origin(scenario: Scenario) -> Origin | None:
     found: dict[str, Difference] = {}
     alone = _one_sided(was, now) | _one_sided(now, was)
     for p in changed:
-        if above := next((part for part in sorted(parts, key=len) if part and p.startswith(f"{part}.")), None):
-            key = next((f"{above}.{word}" for word in WHOLE if f"{above}.{word}" in changed), p)
-            name, before, after = above, _shown(was.get(key)), _shown(now.get(key))
-        elif part := next((part for part in alone if p.startswith(f"{part}.")), None):
+        above = next((part for part in sorted(parts, key=len) if part and p.startswith(f"{part}.")), None)
+        if above is None and (part := next((part for part in alone if p.startswith(f"{part}.")), None)):
             name, before, after = part, _elements(was, part), _elements(now, part)
         else:
-            key, name, before, after = p, p, _shown(was.get(p)), _shown(now.get(p))
-        if before == after:  # to the last digit
-            before, after = repr(was.get(key)), repr(now.get(key))
+            key = next((f"{above}.{word}" for word in WHOLE if f"{above}.{word}" in changed), p) if above else p
+            name, before, after = above or p, _shown(was.get(key)), _shown(now.get(key))
+            if before == after:  # to the last digit
+                before, after = repr(was.get(key)), repr(now.get(key))
         found.setdefault(name, Difference(path=name, shipped=before, now=after))
     return Origin(name=path.stem, differences=tuple(found.values()))
 

@@ -14,7 +14,7 @@ from rollover.recording import Recording, read_parquet, write_parquet
 from rollover.system.boundary import worded
 from rollover.system.errors import Fault, InputError
 from rollover.system.names import distinct
-from rollover.system.own_json import TEXT, read_json
+from rollover.system.own_json import TEXT, read_json, refuse_other
 
 JSON = "compare.json"
 SIDES = ("measured", "simulated")
@@ -63,16 +63,17 @@ def read_curves(folder: Path) -> dict[str, tuple[Path, Recording]]:
         return {}
     try:
         said = read_json(folder / JSON, ANY)
-        names = read_json(folder / JSON, COMPARED)["recordings"] if said["format"] == FORMAT else None
+        if said["format"] == FORMAT:
+            refuse_other(said, COMPARED)
     except (OSError, ValueError) as e:
         message = f"cannot be read: {worded(e)}; {AGAIN}"
         raise InputError(Fault(file=str(folder / JSON), message=message)) from None
-    if names is None:
+    if said["format"] != FORMAT:
         sides = [said[side]["folder"] for side in ("baseline", "candidate") if said.get(side)]
         message = f"two runs compared, got no histories of its own; those of the runs: {', '.join(sides)}"
         raise InputError(Fault(file=str(folder), message=message))
     found = {}
-    for (name, side), file in curve_files(names).items():
+    for (name, side), file in curve_files(said["recordings"]).items():
         if not (folder / file).is_file():
             raise InputError(Fault(file=str(folder), message=f"no {file} there; {AGAIN}"))
         found[f"{name}-{side}"] = (folder / file, read_parquet(folder / file))

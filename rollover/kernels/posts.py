@@ -27,13 +27,12 @@ from rollover.kernels.dense import solve_in_place
 from rollover.kernels.rate import overstress
 from rollover.kernels.tables import (
     HINGE,
-    ROT,
     S_DELTA_NOW,
     S_FORCE_NOW,
     T_A,
     T_B,
 )
-from rollover.kernels.vectors import cross, direction_row, place, to_body
+from rollover.kernels.vectors import cross, direction_row, place, to_body, to_world
 
 # columns of post_f: rows of the post's axes, along, depth, width (9), its height H, retardation of its dashpots (6, s),
 # elastic stiffness and compliance of its head (36 each)
@@ -285,7 +284,7 @@ def stiffen_post(t: Any, i: int, m: int, f: float, fd: float, K: Any, room: Any)
         w += n[P_AXES + 6 + k] * q[S_DELTA_NOW + k]
     for k in range(3):
         e = n[P_AXES + 3 * k : P_AXES + 3 * k + 3]
-        x, y, z = turned_out(under, e)
+        x, y, z = to_world(under, e[0], e[1], e[2])
         direction_row(upper, at, x, y, z, R[k, :6])
         direction_row(under, local, -x, -y, -z, R[k, 6:])
         for j in range(12):
@@ -313,13 +312,3 @@ def stiffen_post(t: Any, i: int, m: int, f: float, fd: float, K: Any, room: Any)
             for a in range(6):
                 total += R[a, j] * G[a, k]
             K[row, column] += total
-
-
-@leaf
-def turned_out(row: Any, e: Any) -> Any:
-    """R e."""
-    return (
-        row[ROT] * e[0] + row[ROT + 1] * e[1] + row[ROT + 2] * e[2],
-        row[ROT + 3] * e[0] + row[ROT + 4] * e[1] + row[ROT + 5] * e[2],
-        row[ROT + 6] * e[0] + row[ROT + 7] * e[1] + row[ROT + 8] * e[2],
-    )

@@ -140,11 +140,17 @@ def _patterns() -> list[tuple[re.Pattern[str], Channel]]:
 
 def describe(name: str) -> Channel:
     """Look a channel up by its full name. Raises ``ValueError`` with the nearest names."""
+    entry = entry_of(name)
+    return CHANNELS[entry] if entry == name else replace(CHANNELS[entry], name=name)
+
+
+def entry_of(name: str) -> str:
+    """Key of `CHANNELS` for a full name, with NAME for what stands there. Raises ``ValueError`` with near names."""
     if name in CHANNELS and "NAME" not in name:
-        return CHANNELS[name]
+        return name
     for pattern, channel in _patterns():
         if pattern.fullmatch(name) and "NAME" not in name.split("/"):
-            return replace(channel, name=name)
+            return channel.name
     close = nearest(name, CHANNELS, most=3)
     help_ = f"did you mean {' or '.join(map(repr, close))}?" if close else "see `rollover list channels`"
     raise ValueError(f"unknown channel, got {name!r}; {help_}")

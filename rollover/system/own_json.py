@@ -21,9 +21,14 @@ def read_json(path: Path, shape: Mapping[str, Any] | None = None) -> dict[str, A
         found = json.loads(path.read_text(encoding="utf-8"))
     except RecursionError:
         raise ValueError("lists or mappings within each other, too many of them") from None
-    if wrong := misfit_of(found, shape or {}):
-        raise ValueError(": ".join(filter(None, wrong)).partition(";")[0])
+    refuse_other(found, shape or {})
     return dict(found)
+
+
+def refuse_other(value: Any, shape: Any) -> None:
+    """Raise ``ValueError`` with path and sentence, without a cure, for a value that is not of its shape."""
+    if wrong := misfit_of(value, shape):
+        raise ValueError(": ".join(filter(None, wrong)).partition(";")[0])
 
 
 def misfit_of(value: Any, shape: Any, path: str = "") -> tuple[str, str] | None:

@@ -11,8 +11,9 @@ import pytest
 import rollover as ro
 from rollover.diagnosis.own_model import diagnose_model, load_model
 from rollover.diagnosis.own_model.declaration import found_at
+from rollover.diagnosis.own_model.tables import tables
 from rollover.diagnosis.settings import SETTINGS
-from rollover.effects import EFFECTS
+from rollover.effects import EFFECTS, effects
 from rollover.spec.channels import CHANNELS
 from tests.own_model.line import IN, OUT, Array, Line, measured, model
 from tests.own_model.worlds import drawn
@@ -25,6 +26,15 @@ def least_squares(recordings: dict[str, ro.Recording], powers: tuple[int, ...]) 
     X = np.stack([u**p for p in powers], axis=1)
     error = 0.01 * np.sqrt(np.diag(np.linalg.inv(X.T @ X)))
     return np.linalg.lstsq(X, y, rcond=None)[0], error
+
+
+def test_terms_stay_in_the_table_whoever_asks_for_it() -> None:
+    """One of them by a name that the module in which its class is made has for something else."""
+    own = Line()
+    own.terms = (*model.terms, replace(model.terms[0], id="effects"))
+    with tables(own):
+        assert {"effects", "bend"} <= set(effects())
+    assert "effects" not in effects()
 
 
 def test_parameters_of_a_line_are_those_of_least_squares() -> None:

@@ -10,7 +10,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from rollover.spec.channels import describe, is_known
+from rollover.spec.channels import describe, entry_of, is_known
 
 TIMELINE = "sim_time"
 FOLLOWED = "world/followed"  # goes with the vehicle without turning
@@ -144,8 +144,8 @@ def series(channel: str) -> Series:
     """
     entry = next((c for c in (channel, f"{channel}_x") if is_known(c)), None)
     group, name, colour = _describe(channel) if entry is not None else ("other", channel, _any(channel))
-    family = re.sub(r"^rops/post/[^/]+", "rops/post/NAME", channel)
-    unit, factor = _BY_CHANNEL.get(family) or shown(describe(entry).unit if entry is not None else "")
+    own_unit = _BY_CHANNEL.get(entry_of(entry)) if entry is not None else None
+    unit, factor = own_unit or shown(describe(entry).unit if entry is not None else "")
     slug = unit.replace("/", "_").replace(" ", "").replace("\N{SUPERSCRIPT TWO}", "2")
     last = "_".join(filter(None, (channel.replace("/", "_"), slug)))
     return Series(
