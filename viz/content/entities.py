@@ -187,7 +187,7 @@ def _describe(channel: str) -> tuple[str, str, int]:
         case ["sensor", name, what]:
             group, quantity, shade = "motion", *_motion("sensor", what)
             return group, f"{name.replace('_', ' ')}: {quantity}", shade
-        case ["occupant" | "hitch" | "trailer" | "suspension" as of, *rest]:
+        case ["occupant" | "hitch" | "trailer" | "suspension" | "bogie" as of, *rest]:
             return _describe_linked(of, rest)
         case ["energy", name]:
             return "energy", name, LEDGER.get(name, _any(name))
@@ -225,9 +225,11 @@ def _describe_rops(channel: str, rest: list[str]) -> tuple[str, str, int]:
 
 
 def _describe_linked(of: str, rest: list[str]) -> tuple[str, str, int]:
-    """What links hold: a trailer, a sprung wheel, an occupant."""
+    """What links hold: a trailer, a bogie, a sprung wheel, an occupant."""
     if of in ("hitch", "trailer"):
         return "hitch", f"{of} {rest[0].replace('_', ' ')}", _any(f"{of} {rest[0]}")
+    if of == "bogie":
+        return "suspension", *_describe_occupant([of, *rest])
     return of, *_describe_occupant(rest)
 
 
