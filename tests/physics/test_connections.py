@@ -146,7 +146,7 @@ def answer_of(rops: Rops | None) -> dict:
     return json_of(frame_test(scenario, segments=4))
 
 
-def test_a_weak_weld_ends_a_test_and_a_strong_one_changes_nothing() -> None:
+def test_a_weak_weld_ends_a_test_a_strong_one_changes_nothing() -> None:
     without, weak, strong = answer_of(None), answer_of(welded(4.0)), answer_of(welded(10.0))
     assert (without["verdict"], weak["verdict"], strong["verdict"]) == ("met", "not met", "met")
     for old, new in zip(without["tests"], strong["tests"], strict=True):
