@@ -19,7 +19,7 @@ from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.ensemble_validation import restarted_base
 from rollover.diagnosis.selection.explanation import Explanation, kind_of, with_conditions_refitted
 from rollover.diagnosis.selection.forward_step import by_chance, confusion_set, step
-from rollover.diagnosis.selection.scan import score_candidates
+from rollover.diagnosis.selection.screening import score_candidates
 from rollover.diagnosis.settings import SETTINGS
 from rollover.scenario import Scenario
 

@@ -14,7 +14,7 @@ from rollover.diagnosis.alone import follows_a_law, repeats_its_course
 from rollover.diagnosis.conclusion import Asked, Conclusion, concluded
 from rollover.diagnosis.data.condition_uncertainty import with_rounding_uncertainty
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.data.inconsistent import Aside, find_inconsistencies, without_inconsistent
+from rollover.diagnosis.data.inconsistent import Aside, find_inconsistencies, without_inconsistent, wrong_conditions
 from rollover.diagnosis.data.onset import clock_notes, with_clock_zeros
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
@@ -23,12 +23,10 @@ from rollover.diagnosis.fit.time_shift import clock_outliers, estimate_time_shif
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference.discrepancy import Discrepancy, estimated, learned_from_references, with_discrepancy
 from rollover.diagnosis.inference.taught_course import taught_by
-from rollover.diagnosis.inference.wrong_condition import wrong_conditions
 from rollover.diagnosis.invariants import checked
 from rollover.diagnosis.io import REFERENCE, json_of, recordings_in
-from rollover.diagnosis.late_clocks import with_clock_finding
 from rollover.diagnosis.prepared import prepared, weighted_datasets
-from rollover.diagnosis.reported import reported
+from rollover.diagnosis.reported import reported, with_clock_finding
 from rollover.diagnosis.result import Diagnosis, Estimate
 from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.settings import SETTINGS

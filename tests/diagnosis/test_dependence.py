@@ -32,7 +32,7 @@ from rollover.diagnosis.inference.newmark import newmark_response
 from rollover.diagnosis.inference.residual_force import channels_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.spectral_lines import lines, without
-from rollover.diagnosis.selection.flexibility import is_flexible_soil, is_over_flexible
+from rollover.diagnosis.selection.simplification import is_flexible_soil, is_over_flexible
 from rollover.effects import Search
 from rollover.proof.generator import Order, make
 from rollover.recording import Clock, Recording

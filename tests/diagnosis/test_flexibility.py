@@ -10,7 +10,7 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.fit.parameterisation import coordinate
 from rollover.diagnosis.selection import decision
-from rollover.diagnosis.selection.flexibility import curvature_gain, drift, is_a_curve, is_straight_line, square
+from rollover.diagnosis.selection.simplification import curvature_gain, drift, is_a_curve, is_straight_line, square
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 from tests.diagnosis.test_fits import GAIN, candidate, judge_of

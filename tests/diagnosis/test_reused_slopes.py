@@ -16,7 +16,7 @@ from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import without_effect
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.selection.forward_step import reusable_slopes
-from rollover.diagnosis.selection.scan import score_candidates
+from rollover.diagnosis.selection.screening import score_candidates
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.test_scan import judge_of as looks_of
 from tests.diagnosis.test_slopes import CHANNEL, MASS, SIGMA, SLOPE, TIME, Late, dataset

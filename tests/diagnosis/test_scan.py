@@ -15,7 +15,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.noise.ensemble import HeavyTail
-from rollover.diagnosis.selection import scan
+from rollover.diagnosis.selection import screening
 from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.selection.score_test import ScoreTest, _best_amplitude, _birge_ratio, _visible, score_test
 from rollover.diagnosis.selection.screening import _begun_at, promising
@@ -136,10 +136,10 @@ def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.Monk
             points={"c2": ((0.7,), (0.1,))}, starts=begun[len(only)],
         )  # fmt: skip
 
-    monkeypatch.setattr(scan, "score_test", scored)
+    monkeypatch.setattr(screening, "score_test", scored)
     problem, base = judge_of((0.0,) * 5, (0.0,) * 5)
     every = [replace(SLOPE, id=f"c{k}") for k in range(30)] + [replace(SLOPE, id="c77", kind="sensor")]
-    found = scan.score_candidates(problem, base, every, [[r] for r in range(5)])
+    found = screening.score_candidates(problem, base, every, [[r] for r in range(5)])
     assert [n for n, _ in asked] == [SETTINGS.forward.runs.few, SETTINGS.forward.runs.looked_at]
     assert len(asked[0][1]) == 31
     assert asked[1][1] == [f"c{k}" for k in range(SETTINGS.forward.runs.shortlist)] + ["c77"]
@@ -186,10 +186,10 @@ def test_a_leader_on_few_recordings_is_tried_on_all(
         scores = {c.key: 40.0 if len(only) == SETTINGS.forward.runs.few else 5.0 for c in candidates}
         return ScoreTest(score=max(scores.values()), scores=scores, null=np.ones(10), detectable={})
 
-    monkeypatch.setattr(scan, "score_test", scored)
+    monkeypatch.setattr(screening, "score_test", scored)
     problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
     problem.heavy_tailed = heavy_tailed
-    found = scan.score_candidates(problem, base, [SLOPE], [[r] for r in range(4)])
+    found = screening.score_candidates(problem, base, [SLOPE], [[r] for r in range(4)])
     assert found.scores["slope"] == kept
     assert found.score == 5.0  # what is claimed is claimed by all
 
@@ -206,12 +206,12 @@ def test_the_leader_of_the_robust_screening_is_tried_first(monkeypatch: pytest.M
         null = np.sort(np.random.default_rng(0).chisquare(1, 1000))
         return ScoreTest(score=max(scores.values()), scores=scores, null=null, detectable={})
 
-    monkeypatch.setattr(scan, "score_test", scored)
-    monkeypatch.setattr(scan, "strong_starts", lambda *_: {})
+    monkeypatch.setattr(screening, "score_test", scored)
+    monkeypatch.setattr(screening, "strong_starts", lambda *_: {})
     problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
     problem.heavy_tailed, problem.effort = False, replace(problem.effort, leaders=3)
     every = [replace(SLOPE, id=f"c{k}", kind="sensor" if k == 9 else "parameter") for k in range(10)]
-    found = scan.score_candidates(problem, base, every, [[r] for r in range(4)])
+    found = screening.score_candidates(problem, base, every, [[r] for r in range(4)])
     assert not problem.heavy_tailed
     assert found.leading == ("c7", "c5")
     assert [c.key for c in found.ranked(every)][:5] == ["c7", "c5", "c0", "c1", "c2"]  # c7 is first of both
@@ -222,7 +222,7 @@ def test_the_leader_of_the_robust_screening_is_tried_first(monkeypatch: pytest.M
     assert all("c9" not in keys for heavy_tailed, keys in asked if heavy_tailed)
     problem.heavy_tailed = True
     asked.clear()
-    assert scan.score_candidates(problem, base, every, [[r] for r in range(4)]).leading == ()
+    assert screening.score_candidates(problem, base, every, [[r] for r in range(4)]).leading == ()
     assert len(asked) == 2
 
 
@@ -275,17 +275,17 @@ def test_no_screening_beside_a_model_without_usable_runs(
         null = np.sort(np.random.default_rng(0).chisquare(1, 1000))
         return ScoreTest(score=float(np.quantile(null, 1.0 - hint)), scores={}, null=null, detectable={})
 
-    monkeypatch.setattr(scan, "score_candidates", scored)
+    monkeypatch.setattr(screening, "score_candidates", scored)
     problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
     problem.effort = replace(problem.effort, is_ensemble=is_ensemble)
     first = ScoreTest(score=0.0, scores={}, null=np.zeros(10), detectable={}, only=(0, 2))
-    scan.rescored(problem, base, base, [SLOPE], [[r] for r in range(4)], first)
+    screening.rescored(problem, base, base, [SLOPE], [[r] for r in range(4)], first)
     assert len(asked) == looks_made
     assert asked[0] == ((base, (0, 2)) if is_ensemble else (None, ()))
     if looks_made == 2:
         assert asked[1] == (None, ())
     asked.clear()
-    scan.rescored(problem, base, None, [SLOPE], [[r] for r in range(4)], first)  # where the rest is structured
+    screening.rescored(problem, base, None, [SLOPE], [[r] for r in range(4)], first)  # where the rest is structured
     assert asked == [(None, ())]
 
 

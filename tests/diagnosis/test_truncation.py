@@ -17,7 +17,7 @@ from rollover.diagnosis.fit.step import Inquiry
 from rollover.diagnosis.forward.averaging import Averaged
 from rollover.diagnosis.forward.full_run import RunSimulator
 from rollover.diagnosis.noise.truncation import shortened, shortly_after_impact, truncation_notes, up_to
-from rollover.diagnosis.selection import forward_step, scan
+from rollover.diagnosis.selection import forward_step, screening
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
@@ -212,8 +212,8 @@ def test_screening_and_first_fits_are_truncated_final_fits_not(monkeypatch: pyte
         asked.append(("look", problem, base.blocks[0].residual.size))
         return ScoreTest(score=0.0, scores={}, null=np.zeros(10), detectable={})
 
-    monkeypatch.setattr(scan, "score_test", gated)
-    scored = scan.score_candidates(problem, base, [], [[0], [1]])
+    monkeypatch.setattr(screening, "score_test", gated)
+    scored = screening.score_candidates(problem, base, [], [[0], [1]])
 
     def screened(inquiry: Inquiry, base: Fitted, *_: object) -> list[Any]:
         asked.append(("screen", inquiry.problem, base.blocks[0].residual.size))

@@ -9,8 +9,8 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import Dataset, dataset_of
+from rollover.diagnosis.data.inconsistent import wrong_conditions
 from rollover.diagnosis.forward.forward_model import simulator_of
-from rollover.diagnosis.inference.wrong_condition import wrong_conditions
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 

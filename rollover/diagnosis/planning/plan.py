@@ -12,8 +12,9 @@ from rollover.diagnosis.fit.parameterisation import Candidate, is_limit, null_of
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.planning.next_test import Advice, Grid, advice, varied
 from rollover.diagnosis.planning.planned import Instruments, planned
-from rollover.diagnosis.planning.separation import Apart, Tests
-from rollover.diagnosis.planning.strength import (
+from rollover.diagnosis.planning.separation import (
+    Apart,
+    Tests,
     detection,
     of_one,
     point_where_it_acts,

@@ -16,13 +16,17 @@ from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.fit.threshold_scan import has_threshold, threshold_ranges, threshold_starts
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, is_enough, mismatch_of
-from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.forward_step import step, with_noise_of_fit
 from rollover.diagnosis.selection.restarts import continued_from, with_secondary_parameters
-from rollover.diagnosis.selection.scan import score_candidates
 from rollover.diagnosis.selection.score_test import ScoreTest
-from rollover.diagnosis.selection.screening import is_far
-from rollover.diagnosis.selection.simplification import followed, in_usual_shape, mirror_images, simpler
+from rollover.diagnosis.selection.screening import is_far, score_candidates
+from rollover.diagnosis.selection.simplification import (
+    followed,
+    in_usual_shape,
+    is_over_flexible,
+    mirror_images,
+    simpler,
+)
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
