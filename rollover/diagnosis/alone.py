@@ -133,9 +133,9 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
         if becomes_best or any(rival is f for f in near):
             continue
         gain = start - float(held_out(rival, groups).chi2.sum())
-        is_kin = rival.candidates[-1].family == best.candidates[-1].family
-        is_probable = (is_kin or gain > TUNING.half_share * most) and any(rival is f for f in probable)
-        if ((is_kin or is_tolerated(problem, rival)) and gain >= TUNING.nearly_all * most) or is_probable:
+        is_same_family = rival.candidates[-1].family == best.candidates[-1].family
+        is_probable = (is_same_family or gain > TUNING.half_share * most) and any(rival is f for f in probable)
+        if ((is_same_family or is_tolerated(problem, rival)) and gain >= TUNING.nearly_all * most) or is_probable:
             near.append(rival)
     return near
 

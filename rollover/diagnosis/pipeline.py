@@ -219,10 +219,10 @@ def _beside_estimated_discrepancy(
             )
     if isinstance(other, Diagnosis):
         return None
-    says_more = bool(other.effects) or (
+    explains_more = bool(other.effects) or (
         other.verdict == "no-mismatch" and learned.is_usual and not _is_reproduced(other)
     )
-    return reported(other) if says_more else None
+    return reported(other) if explains_more else None
 
 
 def _is_reproduced(found: Conclusion) -> bool:

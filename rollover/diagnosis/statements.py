@@ -62,7 +62,7 @@ def named(
             Named(
                 id=c.id,
                 kind=c.kind,
-                statement=" ".join([effect.says(), *same.values(), *_clock_ambiguity(problem, c, values)]),
+                statement=" ".join([effect.statement(), *same.values(), *_clock_ambiguity(problem, c, values)]),
                 parameters=parameters,
                 settings=values,
                 channel=c.channel,

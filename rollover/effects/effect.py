@@ -77,7 +77,7 @@ class Effect:
     search: ClassVar[Mapping[str, Search]] = {}
     shapes: ClassVar[tuple[str, ...]] = ()  # parameters that few recordings tell from the strength: mostly at default
     forms: ClassVar[tuple[Form, ...]] = ()  # what else goes by its name, no matter of degree
-    narrow: ClassVar[
+    local_starts: ClassVar[
         Mapping[str, tuple[float, ...]]
     ] = {}  # parameter -> places in its range, near which alone it tells
     is_abrupt: ClassVar[bool] = False  # it rings, or turns from one instant to the next: drops take shorter steps
@@ -140,7 +140,7 @@ class Effect:
         """Ids of other effects beside which it does the very same at other values, and the sentence that says so."""
         return {}
 
-    def says(self) -> str:
+    def statement(self) -> str:
         """The sentence, with the values in it; that of its form, if it is in one that has a sentence of its own."""
         own = (f for f in self.forms if f.sentence and all(getattr(self, n) == v for n, v in f.fixed.items()))
         sentence = next((f.sentence for f in own), self.sentence)

@@ -291,7 +291,7 @@ class PayloadShift(Effect):
         "travel": Search(0.02, 1.0, "log"),
         "friction": Search(0.0, 1.0),
     }
-    narrow: ClassVar[Mapping[str, tuple[float, ...]]] = {  # it meets its wall at a moment that its travel sets
+    local_starts: ClassVar[Mapping[str, tuple[float, ...]]] = {  # it meets its wall at a moment that its travel sets
         "travel": tuple(0.1 + 0.022 * k for k in range(36)),
         "friction": (0.25, 0.5),
     }

@@ -90,7 +90,7 @@ SOME = (0.8, 0.9, 1.0, 0.9, 1.0, 0.8)  # of which a discrepancy of unit size lea
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (3.0, 3.0, 3.0, 7.0, 7.0, 3.0), 1e-9, "unexplained"),
     ],
 )
-def test_an_effect_is_named_where_it_predicts_half_else_forgiven(
+def test_an_effect_is_named_where_it_predicts_half(
     base: tuple[float, ...], left: tuple[float, ...], p_value: float, verdict: str
 ) -> None:
     found, said = verdict_on_single_effect(
@@ -151,7 +151,7 @@ def test_conditions_tell_what_leads_then_what_is_left(
     assert best_predictor(PROBLEM, one, GROUPS).candidates[-1].id == leads
 
 
-def test_rivals_akin_or_within_the_discrepancy_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rivals_of_a_family_or_within_the_discrepancy_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(alone, "credible", lambda _, fits: list(fits[:1]))
     best = fitted("soil-layer", (0.5,) * DROPS)
     rivals = {
@@ -193,7 +193,7 @@ def test_many_scales_are_told_by_the_least_and_the_most() -> None:
 
 
 @pytest.mark.parametrize(("low", "is_told"), [(0.12, True), (-0.05, False)])
-def test_a_part_surely_predicted_is_told_though_forgiven(low: float, is_told: bool) -> None:
+def test_a_part_surely_predicted_is_named_within_the_tolerance(low: float, is_told: bool) -> None:
     candidate = fitted("sensor-bias", SOME).candidates[-1]
     best = (candidate, Share(share=0.35, low=low, high=0.58))
     said = usual_model_error_sentence({"ground/sinkage": 0.021}, 1e-9, 6, best)

@@ -234,7 +234,7 @@ def test_offsets_are_no_autocorrelation_of_the_noise() -> None:
             assert (after[0].signals[0] is dataset[0].signals[0]) == kept
 
 
-def test_a_hum_of_any_frequency_is_a_mismatch_of_its_channel() -> None:
+def test_a_line_of_any_frequency_is_a_mismatch_of_its_channel() -> None:
     """At 130 Hz it is beyond the slow waves of every phase."""
     made = []
     for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):

@@ -111,7 +111,7 @@ def test_chance_slopes_of_the_ensemble_mean_are_not_believed(scatter: float, is_
     assert reach(left) == ((0.0, 0.0) if is_told else None)
 
 
-def test_samples_count_alike_at_all_places_and_no_clock_does() -> None:
+def test_samples_count_alike_at_all_points_and_no_clock_does() -> None:
     """Half the samples count 0.6 at five places and 0.3 at three: 0.6 at all. What a clock may do is nobody's.
 
     Of a slope v the late half counts 0.36: c = 0.68 |v|^2. With the clock at right angles to v, nothing changes.

@@ -37,13 +37,13 @@ from rollover.effects import EFFECTS
 from rollover.proof.generator import Case, make, plan
 from rollover.scenario import load
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
-from tests.diagnosis.test_fits import candidate, judge_of
+from tests.diagnosis.test_fits import candidate, problem_of
 from tests.physics.scenes import shipped
 
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
 
 
-def judge_of_case(case: Case, folder: Path) -> Problem:
+def problem_of_case(case: Case, folder: Path) -> Problem:
     path = folder / "scenario.yaml"
     path.write_text(case.scenario, encoding="utf-8")
     return Problem([dataset_of(str(k), *simulated(load(path), r)) for k, r in enumerate(case.recordings)])
@@ -54,7 +54,7 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     true = {"stiffness": 1.888e6, "damping": 1372.0}
     hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
     speeds = (1.13, 2.4, 2.8, 1.98, 1.6, 3.1)
-    problem = judge_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
+    problem = problem_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
     c = candidate(problem, "structural-compliance")
     count = sum(e.count for e in problem.dataset)
     led_astray = problem.fit((c,), (0.5625, 0.2), shifts=[0.0] * len(speeds))
@@ -75,14 +75,14 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     assert c.values(found.x)["damping"] == pytest.approx(true["damping"], rel=0.1)
 
 
-def test_a_misfitted_nose_is_found_by_its_ringing(
+def test_a_misfitted_nose_is_found_by_its_oscillation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Damped until it hardly rings, as a share of the mass that it has not: nothing leads from there to what it is."""
     true = {"stiffness": 3.619e6, "damping": 385.3, "nose_share": 0.2545}
     hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
     speeds = (1.13, 1.6, 2.4)
-    problem = judge_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
+    problem = problem_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
     c = candidate(problem, "structural-compliance")
     astray = problem.fit(
         (c,), coordinates({"stiffness": 6.4e6, "damping": 8000.0}, c.search), shifts=[0.0] * len(speeds)
@@ -106,7 +106,7 @@ def test_the_clock_of_a_channel_is_followed_against_all_others(tmp_path: Path) -
     case = make(next(order for order in plan(63, 20262911, ["single"]) if order.index == 45))
     (truth,) = case.truth["effects"]
     assert (truth["id"], truth["channel"]) == ("sensor-clock-offset", FORCE)
-    problem = judge_of_case(case, tmp_path)
+    problem = problem_of_case(case, tmp_path)
     c = candidate(problem, f"sensor-clock-offset:{FORCE}")
     begun = (coordinate(0.006138, c.search["offset"]),)
     stopped = problem.fit((c,), begun, shifts=[1.43e-4] * len(case.recordings), width=2)
@@ -119,7 +119,7 @@ def test_the_clock_of_a_channel_is_followed_against_all_others(tmp_path: Path) -
 
 
 def test_a_fit_whose_rounds_were_too_few_is_gone_on_with() -> None:
-    problem = judge_of(recorded({"effects.soil-layer.stiffness_ratio": 1.3, "effects.soil-layer.depth": 0.12}, 6))
+    problem = problem_of(recorded({"effects.soil-layer.stiffness_ratio": 1.3, "effects.soil-layer.depth": 0.12}, 6))
     c = candidate(problem, "soil-layer")
     short = problem.fit((c,), (0.62, 0.4), rounds=2)
     whole = problem.fit((c,), (0.62, 0.4), width=1)
@@ -130,11 +130,11 @@ def test_a_fit_whose_rounds_were_too_few_is_gone_on_with() -> None:
     assert ended(problem, whole).chi2 <= whole.chi2
 
 
-def test_a_nose_is_found_along_the_valley_of_its_frequency(tmp_path: Path) -> None:
+def test_a_nose_is_found_along_the_ridge_of_its_frequency(tmp_path: Path) -> None:
     """Little damping: hundreds of radians of ringing know k/(s (1 - s)) long before they know either."""
     case = make(next(order for order in plan(63, 20262913, ["single"]) if order.index == 7))
     true = case.truth["effects"][0]["parameters"]
-    problem = judge_of_case(case, tmp_path)
+    problem = problem_of_case(case, tmp_path)
     c = candidate(problem, "structural-compliance")
     share = EFFECTS[c.id].reshaped(true, "nose_share", 0.1)
     plain = problem.fit((c,), [coordinate(share[name], s) for name, s in c.search.items()])
@@ -157,7 +157,7 @@ def test_a_noses_share_moves_at_constant_frequency_and_damping() -> None:
     for name in ("stiffness", "damping"):
         w = [n[name] / (n["nose_share"] * (1.0 - n["nose_share"])) for n in (before, after)]
         assert w[1] == pytest.approx(w[0], rel=1e-12)
-    problem = judge_of(recorded({}, speeds=(2.0,)))
+    problem = problem_of(recorded({}, speeds=(2.0,)))
     whole = replace(candidate(problem, "structural-compliance").whole(), along=("nose_share",))
     x = (0.4, 0.5, 0.6)
     plain, there = whole.plain(x)
@@ -171,7 +171,7 @@ def test_a_noses_share_moves_at_constant_frequency_and_damping() -> None:
 def test_the_share_of_an_unweighed_nose_is_found() -> None:
     true = {"stiffness": 1e6, "damping": 500.0, "nose_share": 0.2}
     hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
-    problem = judge_of(recorded(hidden, 3, speeds=(1.2, 2.0, 2.8), channels=CHANNELS, rate=1500.0, noise=0.005))
+    problem = problem_of(recorded(hidden, 3, speeds=(1.2, 2.0, 2.8), channels=CHANNELS, rate=1500.0, noise=0.005))
     c = candidate(problem, "structural-compliance")
     count = sum(e.count for e in problem.dataset)
     begun = [coordinate(true[name], s) for name, s in c.search.items()]
@@ -192,7 +192,7 @@ def test_a_threshold_is_found_though_a_fit_ended_at_another() -> None:
     """A crust that is hardly stiffer: ends elsewhere are nearly as good, and no slope leads from one to the other."""
     true = {"thickness": 0.065, "stiffness_ratio": 1.02}
     hidden = {f"effects.soil-crust.{name}": value for name, value in true.items()}
-    problem = judge_of(recorded(hidden, 2, speeds=(1.2, 1.8, 2.4, 3.0), channels=CHANNELS, rate=1500.0, noise=0.004))
+    problem = problem_of(recorded(hidden, 2, speeds=(1.2, 1.8, 2.4, 3.0), channels=CHANNELS, rate=1500.0, noise=0.004))
     c = candidate(problem, "soil-crust")
     begun = [coordinate(v, s) for v, s in zip((0.092, 1.01), c.search.values(), strict=True)]
     ended = problem.fit((c,), begun, width=1)
@@ -210,7 +210,7 @@ def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
     case = make(next(order for order in plan(63, 20263014, ["single"]) if order.index == 1))
     (truth,) = case.truth["effects"]
     assert (truth["id"], truth["channel"]) == ("sensor-clock-drift", FORCE)
-    problem = judge_of_case(case, tmp_path)
+    problem = problem_of_case(case, tmp_path)
     c = candidate(problem, f"sensor-clock-drift:{FORCE}")
     stopped = problem.fit((c,), (coordinate(truth["parameters"]["drift"] / 6.0, c.search["drift"]),), rounds=0)
     assert stopped is not None
@@ -219,9 +219,9 @@ def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
     assert c.values(found.x)["drift"] == pytest.approx(truth["parameters"]["drift"], rel=0.02)
 
 
-def test_what_rings_is_traced_along_the_valley_of_its_frequency(tmp_path: Path) -> None:
+def test_an_oscillatory_effect_is_traced_along_its_ridge(tmp_path: Path) -> None:
     case = make(next(order for order in plan(63, 20263016, ["single"]) if order.index == 25))
-    problem = judge_of_case(case, tmp_path)
+    problem = problem_of_case(case, tmp_path)
     c = candidate(problem, "structural-compliance").whole()
     ended = {"stiffness": 3.68794e6, "damping": 75.98, "nose_share": 0.184108}
     x = [coordinate(ended[name], s) for name, s in c.search.items()]
@@ -273,7 +273,7 @@ def test_an_abrupt_effect_is_led_by_its_smooth_shape(tmp_path: Path) -> None:
     """A crust whose end leaps past samples: a fit that is stuck far from the truth comes there, another stays."""
     case = make(plan(63, 20263301, ("single",))[43])
     [true] = [e["parameters"] for e in case.truth["effects"]]
-    problem = judge_of_case(case, tmp_path)
+    problem = problem_of_case(case, tmp_path)
     estimate_time_shifts(problem)
     c = candidate(problem, "soil-crust")
     gains = []
@@ -293,7 +293,7 @@ def test_an_abrupt_effect_is_led_by_its_smooth_shape(tmp_path: Path) -> None:
 def test_two_effects_without_a_first_are_tried_together() -> None:
     """A heavier striker on a guide that rubs: a stiffness and the mass led, and friction beside the first."""
     hidden = {"effects.mass.added": 2.3, "effects.guide-friction.force": 31.0}
-    problem = judge_of(recorded(hidden, 1, speeds=(1.4, 2.0, 2.6, 3.2), rate=1000.0, noise=0.003, channels=CHANNELS))
+    problem = problem_of(recorded(hidden, 1, speeds=(1.4, 2.0, 2.6, 3.2), rate=1000.0, noise=0.003, channels=CHANNELS))
     c = {name: candidate(problem, name) for name in ("mass", "soil-stiffness", "guide-friction")}
     base = problem.fit((), ())
     stiffer, heavier = (problem.fit((c[name],), c[name].starts()[0]) for name in ("soil-stiffness", "mass"))
@@ -330,7 +330,7 @@ def test_two_effects_without_a_first_are_tried_together() -> None:
 def test_a_fit_is_ended_finely_whatever_others_may_leave(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rounds that gain less than tells two fits apart are saved, until a fit is the last one."""
     hidden = {"effects.soil-viscous-damping.damping": 900.0}
-    problem = judge_of(recorded(hidden, 2, speeds=(1.6, 2.6), channels=CHANNELS, rate=1500.0, noise=0.005))
+    problem = problem_of(recorded(hidden, 2, speeds=(1.6, 2.6), channels=CHANNELS, rate=1500.0, noise=0.005))
     c, begun = candidate(problem, "soil-viscous-damping"), (0.05,)
     usual = problem.fit((c,), begun)
     monkeypatch.setattr(levenberg_marquardt, "TUNING", replace(levenberg_marquardt.TUNING, converged_gain=1e5))

@@ -21,7 +21,7 @@ from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks, recorded
-from tests.diagnosis.test_fits import candidate, judge_of
+from tests.diagnosis.test_fits import candidate, problem_of
 
 RATIO = Search(0.2, 5.0, "log")
 MASS = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
@@ -204,7 +204,7 @@ def layered(ratio: float, depth: float = DEPTH) -> Problem:
         "effects.soil-layer.depth": depth,
         "effects.soil-layer.stiffness_ratio": ratio,
     }
-    return judge_of(recorded(hidden, 3, speeds=(1.4, 1.9, 2.6), noise=0.003, rate=1000.0))
+    return problem_of(recorded(hidden, 3, speeds=(1.4, 1.9, 2.6), noise=0.003, rate=1000.0))
 
 
 @pytest.mark.parametrize(("ratio", "lost"), [(0.7, 500.0), (1.3, 0.0)])
@@ -322,7 +322,7 @@ def test_far_less_is_far_less_beyond_the_noise(
 
 
 @pytest.mark.parametrize(("left", "taken"), [(1.2, True), (1.5, False)])
-def test_three_become_two_only_where_the_third_is_not_needed(
+def test_three_become_two_only_where_the_third_is_not_retained(
     left: float, taken: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Weighed as noise by all that a pair leaves, what the third effect takes would be noise: it takes 40 of 80."""
@@ -353,13 +353,13 @@ def test_a_pair_that_leaves_nearly_noise_tells_of_it(
     found = Step(base=fitted((), 30.0), fitted=fitted((MASS,), 2.0), p_value=0.0)
     reweighted: list[Any] = []
 
-    def with_noise_model(_judge: Any, fit: Fitted, _phases: Any) -> bool:
+    def with_noise_model(_problem: Any, fit: Fitted, _phases: Any) -> bool:
         reweighted.append(fit)
         return is_noise
 
     monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
     monkeypatch.setattr(pairs, "followed", lambda _, one: (one, SimpleNamespace(p_value=p_value)))
-    monkeypatch.setattr(pairs, "is_enough", lambda _judge, _fit, left: left.p_value > 0.001)
+    monkeypatch.setattr(pairs, "is_enough", lambda _problem, _fit, left: left.p_value > 0.001)
     monkeypatch.setattr(pairs, "with_noise_of_fit", with_noise_model)
     monkeypatch.setattr(pairs, "mismatch_of", lambda *_: SimpleNamespace(p_value=0.4))
     asking = inquiry([])

@@ -124,7 +124,7 @@ def test_a_layer_is_tried_as_the_stiffness_that_it_becomes(leaves: float, taken:
 
 
 @pytest.mark.parametrize(("leaves", "straight"), [(9.0, ("first", "last")), (30.0, ("last",)), (99.0, ())])
-def test_what_was_bent_to_do_anothers_work_is_straight_beside_it(leaves: float, straight: tuple[str, ...]) -> None:
+def test_a_variant_that_did_anothers_work_is_usual_beside_it(leaves: float, straight: tuple[str, ...]) -> None:
     """A layer's width and a rate's reference speed, the one of which is needed where both at once leave far more."""
     layer = Candidate(id="soil-layer", kind="physics", family="", search={"depth": Search(0, 0.4)})
     rate = Candidate(id="soil-rate-hardening", kind="physics", family="", search={"per_decade": Search(0, 0.2)})

@@ -250,7 +250,7 @@ def test_runs_over_wider_steps_are_announced_too(is_helped: bool, monkeypatch: p
     assert not announced & {(0, 0.71 - 0.03), (0, 0.71 - 0.06)}
 
 
-def test_a_leap_to_another_course_on_one_side_is_no_slope() -> None:
+def test_a_jump_to_another_trajectory_on_one_side_is_no_slope() -> None:
     """y = a x sin(wt), and for x > 0.52 another course besides: dy/dx = a sin(wt), as the side below tells."""
 
     class Leaping(Late):

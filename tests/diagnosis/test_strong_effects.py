@@ -22,7 +22,7 @@ from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from tests.diagnosis import test_ensemble
 from tests.diagnosis.test_ensemble import STEP
-from tests.diagnosis.test_scan import CHANNEL, SLOPE, TIME, N, Wave, judge_of
+from tests.diagnosis.test_scan import CHANNEL, SLOPE, TIME, N, Wave, problem_of
 
 
 class Tipping(Wave):
@@ -40,7 +40,7 @@ MASS = replace(SLOPE, id="mass", search={"factor": Search(-2.0, 2.0)})
 
 def tipped(size: float) -> tuple[Problem, Fitted]:
     """Four recordings of a vehicle that tipped, which moves them by so many times their noise, and the base."""
-    problem, base = judge_of((0.0,) * 4, (size,) * 4)
+    problem, base = problem_of((0.0,) * 4, (size,) * 4)
     for e in problem.dataset:
         object.__setattr__(e, "simulator", Tipping(size))
     problem.measured = [size * np.sin(30.0 * TIME) + w for w in np.random.default_rng(1).standard_normal((4, N))]
@@ -178,7 +178,7 @@ def test_a_limit_starts_where_it_is_reached_despite_its_misfit() -> None:
     limit = Candidate(
         id="rops-plasticity", kind="physics", family="x", search={"yield_force": Search(0.0, 33.0)}, null=(null,)
     )  # fmt: skip
-    problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
+    problem, base = problem_of((0.0,) * 4, (0.0,) * 4)
     simulator: Any = Yielding(0.0)
     for e in problem.dataset:
         object.__setattr__(e, "simulator", simulator)

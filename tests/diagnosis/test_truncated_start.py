@@ -87,7 +87,7 @@ def test_a_truncated_fit_is_a_start_if_it_gains_much(
     base, asked = fit((), 40_000.0), []
     before, there = taken(base, fit((MASS,), 10_000.0)), taken(base, fit((LAYER, REBOUND), over_all))
 
-    def one_by_one(asking: Inquiry, no_jacobian: Fitted, begun: Any = (), *, pairs: bool = True) -> Taken:
+    def selected(asking: Inquiry, no_jacobian: Fitted, begun: Any = (), *, pairs: bool = True) -> Taken:
         asked.append([s.fitted.candidates[-1].id for s in begun])
         whole = asking.problem.dataset == ["whole"]
         assert pairs == whole, "all pairs over all that was recorded alone"
@@ -101,7 +101,7 @@ def test_a_truncated_fit_is_a_start_if_it_gains_much(
     monkeypatch.setattr(stepwise, "_cut", lambda *_: "cut")
     monkeypatch.setattr(stepwise, "Problem", lambda _: early)
     monkeypatch.setattr(stepwise, "estimate_time_shifts", lambda _: None)
-    monkeypatch.setattr(stepwise, "forward_selection", one_by_one)
+    monkeypatch.setattr(stepwise, "forward_selection", selected)
     back = {"moves": np.inf}
     monkeypatch.setattr(stepwise, "rebound_residual", lambda *_: back["moves"])
     whole = Inquiry(
@@ -120,7 +120,7 @@ def test_a_truncated_fit_is_a_start_if_it_gains_much(
     assert stepwise.loading_first(whole, before) is before, "what rests as simulated is no reason for ten thousand"
 
 
-def test_the_way_down_ends_before_the_deepest_point() -> None:
+def test_the_loading_ends_before_the_deepest_point() -> None:
     dataset, _ = prepared(load("drop_test"), recordings({}), Executor())
     phases = drop_phases(dataset[0])
     cut = stepwise._cut(dataset[0], phases, 0.9)

@@ -93,7 +93,7 @@ def test_an_end_that_counts_is_kept() -> None:
 
 
 @pytest.mark.parametrize(("off", "is_kept"), [(0.0, False), (1.5, False), (2.5, True)])
-def test_a_light_end_is_kept_where_it_differs_significantly(off: float, is_kept: bool) -> None:
+def test_a_light_end_stays_where_it_differs_significantly(off: float, is_kept: bool) -> None:
     """Samples of noise 1 that count 0.3, of runs that differ by 1: (0.3 off)^2 against 3 (0.3^2 + 0.3^2)."""
     whole = dataset(0.3, off=off)
     one = np.ones(whole.signals[0].rows.size)
@@ -102,7 +102,7 @@ def test_a_light_end_is_kept_where_it_differs_significantly(off: float, is_kept:
     assert (found.recording.time.size == whole.recording.time.size) == is_kept
 
 
-def test_of_one_recording_alone_nothing_after_the_blow_counts() -> None:
+def test_of_one_recording_nothing_after_the_impact_counts() -> None:
     whole = dataset(0.9)
     found = shortened(whole, alone=True)
     assert found.recording.time[-1] == pytest.approx(IMPACT, abs=STEP)
@@ -110,7 +110,7 @@ def test_of_one_recording_alone_nothing_after_the_blow_counts() -> None:
     assert shortened(without, alone=True) is without
 
 
-def test_a_truncated_run_is_the_same_and_its_filter_looks_ahead() -> None:
+def test_a_truncated_run_is_the_same_and_its_filter_runs_on() -> None:
     whole = dataset(0.3, cfc=60)
     found = shortened(whole)
     assert isinstance(found.simulator, RunSimulator)

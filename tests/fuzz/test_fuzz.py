@@ -29,7 +29,7 @@ def test_two_thousand_inputs(tmp_path: Path) -> None:
     assert not done.kinds, report(done)
 
 
-def test_every_command_and_reader_has_a_door(tmp_path: Path) -> None:
+def test_every_command_and_reader_has_an_entry_point(tmp_path: Path) -> None:
     """One that is added later is fuzzed from its first day on, or this says so."""
     all_of_them = doors(tmp_path)
     names = {d.name for d in all_of_them}
@@ -57,7 +57,7 @@ def test_what_a_whole_line_is(line: str, lacks: str) -> None:
     assert bool(is_whole(line)) == bool(lacks)
 
 
-def test_the_judge_sees_what_it_is_to_see(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_oracle_sees_what_it_is_to_see(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from rollover.cli import catalogue
     from tests.fuzz import oracle
 

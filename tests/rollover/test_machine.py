@@ -245,7 +245,7 @@ def test_a_fault_of_the_machine_in_words(fault: Any, line: str) -> None:
 
 
 @pytest.mark.parametrize("fault", [MemoryError(), BrokenExecutor(), OSError(errno.EIO, "x")])
-def test_the_door_turns_it_into_a_status_and_not_a_bug(fault: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_turns_it_into_a_status_and_not_a_bug(fault: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def breaks(*_: Any, **__: Any) -> None:
         raise fault
 

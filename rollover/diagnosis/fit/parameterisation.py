@@ -62,7 +62,7 @@ class Candidate:
     @property
     def is_local(self) -> bool:
         """Whether it acts only near one point of its range."""
-        return bool(EFFECTS[self.id].narrow)
+        return bool(EFFECTS[self.id].local_starts)
 
     @property
     def is_discontinuous(self) -> bool:
@@ -152,7 +152,7 @@ class Candidate:
             # what the scenario has may be far above what ever acts: a yield force, a stop
             is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
             return [*beside, *((x,) for x in TUNING.limit_points if is_limit)]
-        axes, local = [], EFFECTS[self.id].narrow
+        axes, local = [], EFFECTS[self.id].local_starts
         for n, (name, search) in zip(null, self.search.items(), strict=True):
             if n is not None:
                 axes.append([min(n + 2.0 * TUNING.run_step, 0.9)])

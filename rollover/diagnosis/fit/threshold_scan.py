@@ -103,7 +103,7 @@ def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) ->
         chi2 = None if x is None else chi2_at(problem, fitted.candidates, x, shifts, few)
         if x is not None and chi2 is not None:
             met.append((chi2, x))
-    for x in _best_start(problem, fitted, _local_minima(met)[: TUNING.valleys], few):
+    for x in _best_start(problem, fitted, _local_minima(met)[: TUNING.minima], few):
         again = problem.fit(fitted.candidates, x, shifts=shifts, width=1)
         best = again if again is not None and again.chi2 < best.chi2 else best
     return best
@@ -131,7 +131,7 @@ def _along_frequency_ridge(problem: Problem, fitted: Fitted, stretch: Stretch) -
     few = representative_recordings(fitted)
     met = [(chi2, y) for y in there if (chi2 := chi2_at(problem, candidates, y, shifts, few)) is not None]
     best = fitted
-    for y in _local_minima(met)[: TUNING.valleys]:
+    for y in _local_minima(met)[: TUNING.minima]:
         new = problem.fit(candidates, y, shifts=shifts, width=1)
         if new is not None:
             plain = (*new.x[:at], *variant.plain(new.own)[1])

@@ -116,7 +116,7 @@ class Tests:
             return None
         recorded, far = found
         nearest = self._nearest(c, x, rival)
-        if not nearest or nearest[0][0] > TUNING.beyond_doubt:
+        if not nearest or nearest[0][0] > TUNING.certain_noncentrality:
             least = min([far, *(chi2 for chi2, _ in nearest)])
             x_rival = nearest[0][1] if nearest else ()
         else:

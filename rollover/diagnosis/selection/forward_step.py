@@ -257,14 +257,14 @@ def _chosen(screened: Sequence[Screened], effort: Effort, scored: ScoreTest) -> 
     by_key = {s.candidate.key: s for s in screened}
     ranked = [by_key[c.key] for c in scored.ranked([s.candidate for s in screened])]
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
-    reading = [s for s in ranked if s.candidate.kind == "sensor"]
+    of_sensors = [s for s in ranked if s.candidate.kind == "sensor"]
     related = of_same_family([s.candidate for s in moving], effort.promising, effort.leaders)
 
     def score(s: Screened) -> float:
         return scored.scores.get(s.candidate.key, 0.0)
 
     able = []
-    for own in (moving, reading):
+    for own in (moving, of_sensors):
         least = TUNING.least_score * max(map(score, own), default=0.0)
         begun_well = [s for s in by_start if s in own]
         able += [

@@ -51,12 +51,12 @@ def best_subsets(
     found, mismatch = followed(inquiry, pair)
     if not is_enough(problem, found.fitted, mismatch) and any(c.is_oscillatory for c in found.fitted.candidates):
         # what its shape shows now did not show beside another one
-        ringing = (
+        oscillatory = (
             found.fitted
             if found.fitted.candidates[-1].is_oscillatory
             else problem.again(first_effect_last(found.fitted))
         )
-        other = with_first_replaced(inquiry, ringing)
+        other = with_first_replaced(inquiry, oscillatory)
         if other is not None and other.fitted.chi2 < found.fitted.chi2:
             found, mismatch = followed(inquiry, other)
     if is_whole and costs(problem, found.fitted, current) > SETTINGS.selection.ensemble_validation.least_gain:

@@ -164,7 +164,7 @@ class Parameterisation:
 class ThresholdScan:
     """Scan over a threshold."""
 
-    valleys: int = 3  # minima on either side in which fits begin; chosen
+    minima: int = 3  # minima on either side in which fits begin; chosen
     short_rounds: int = 4  # rounds of a fit that shows whether a minimum is worth more; chosen
     wide_count: int = 80  # places over the whole range; chosen
     near_step: float = 0.002  # coordinate (0 to 1): distance of places about a fit; chosen
