@@ -75,7 +75,9 @@ class Effect:
     competes: ClassVar[bool] = True  # as an explanation of what a scenario misses
     null: ClassVar[Mapping[str, float | None]] = {}
     search: ClassVar[Mapping[str, Search]] = {}
-    shapes: ClassVar[tuple[str, ...]] = ()  # parameters that few recordings tell from the strength: mostly at default
+    secondary: ClassVar[
+        tuple[str, ...]
+    ] = ()  # parameters that few recordings tell from the strength: mostly at default
     forms: ClassVar[tuple[Form, ...]] = ()  # what else goes by its name, no matter of degree
     local_starts: ClassVar[
         Mapping[str, tuple[float, ...]]
@@ -93,10 +95,12 @@ class Effect:
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {}
 
     def __init_subclass__(cls) -> None:
-        """Enter the table. Raises ``TypeError`` for a class without an id and for an id given twice."""
+        """Enter the table. Raises ``TypeError`` for one without an id, an id given twice, an old name."""
         known = EFFECTS.get(cls.id)
         if not cls.id:
             raise TypeError(f"{cls.__module__}.{cls.__name__}: an effect needs an `id`")
+        if "shapes" in vars(cls):  # its name until 0.1: unread, such a parameter would be fitted as a strength is
+            raise TypeError(f"{cls.__module__}.{cls.__name__}: `shapes` is named `secondary`")
         if (
             known is not None
             and is_current(known)

@@ -27,7 +27,7 @@ def of(*effects: tuple[str, tuple[str, ...]]) -> Fitted:
 
 
 LAYER, CRUST, STIFFNESS = ("soil-layer", ("a", "b")), ("soil-crust", ("a", "b")), ("soil-stiffness", ("a",))
-BENT = ("soil-layer", ("a", "b", "width"))
+VARIANT = ("soil-layer", ("a", "b", "width"))
 
 
 @pytest.mark.parametrize(
@@ -35,9 +35,9 @@ BENT = ("soil-layer", ("a", "b", "width"))
     [
         (LAYER, LAYER, {"soil-layer": LAYER}, ["soil-layer"]),  # found beside just this layer
         # the layer is straight beside it
-        (BENT, BENT, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
-        (BENT, LAYER, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
-        (BENT, LAYER, {"soil-layer": LAYER, "soil-crust": STIFFNESS, "soil-stiffness": STIFFNESS},
+        (VARIANT, VARIANT, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
+        (VARIANT, LAYER, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
+        (VARIANT, LAYER, {"soil-layer": LAYER, "soil-crust": STIFFNESS, "soil-stiffness": STIFFNESS},
          ["soil-layer", "soil-crust", "soil-layer"]),
     ],
 )  # fmt: skip
@@ -72,7 +72,7 @@ def test_the_last_effect_is_searched_anew_beside_variants(
 
 
 @pytest.mark.parametrize(
-    ("effort", "beside", "surely", "fitted_again"),
+    ("effort", "beside", "certain", "fitted_again"),
     [
         (SETTINGS.forward.runs, ("soil-layer", ("a",)), set(), [0]),
         (SETTINGS.forward.runs, LAYER, set(), [0, 1]),
@@ -82,7 +82,7 @@ def test_the_last_effect_is_searched_anew_beside_variants(
     ],
 )
 def test_full_runs_keep_sure_effects_and_reuse_the_last_fit(
-    monkeypatch: pytest.MonkeyPatch, effort: Effort, beside: Any, surely: set[int], fitted_again: list[int]
+    monkeypatch: pytest.MonkeyPatch, effort: Effort, beside: Any, certain: set[int], fitted_again: list[int]
 ) -> None:
     """Without either 9 per sample more is left: both are needed."""
     asked: list[int] = []
@@ -93,7 +93,7 @@ def test_full_runs_keep_sure_effects_and_reuse_the_last_fit(
         return left(of(CRUST), 9.0 - k)
 
     monkeypatch.setattr(decision, "without_effect", without)
-    monkeypatch.setattr(decision, "significant_by_wald", lambda *_: surely)
+    monkeypatch.setattr(decision, "significant_by_wald", lambda *_: certain)
     base, held = left(of(beside), 8.0), left(of(("soil-layer", ("a",)), CRUST), 1.0)
     problem = cast(Any, SimpleNamespace(again=lambda f: f, effort=effort))
     assert decision.backward_elimination(problem, held, base) is held
@@ -137,7 +137,7 @@ MASS, SPEED, RATE, DRAG = ((i, ("a",)) for i in ("mass", "impact-speed", "soil-r
 
 
 @pytest.mark.parametrize(
-    ("answers", "needless", "asked", "found"),
+    ("answers", "surplus", "asked", "found"),
     [
         # each comes back
         ([LAYER, CRUST], "", ["soil-layer", "soil-crust"], {"soil-layer", "soil-crust", "mass"}),
@@ -180,7 +180,7 @@ def test_a_full_set_swapped_again_and_again_is_no_answer(
 
 
 @pytest.mark.parametrize(
-    ("count", "p_value", "matters", "needless", "is_open"),
+    ("count", "p_value", "matters", "surplus", "is_open"),
     [
         (3, 0.2, True, False, True),
         (3, 0.01, True, False, False),  # three that are bent to much must leave more than chance leaves once in twenty

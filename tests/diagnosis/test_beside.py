@@ -128,14 +128,14 @@ def test_a_gain_is_one_draw_however_many_recordings_repeat_it() -> None:
     assert by_chance(base, [fitted("soil-layer", (1.9,) * DROPS)], scored, 10.0) > anew
 
 
-SURELY, MAYBE = (0.20, 0.22, 0.19, 0.21, 0.20, 0.18), (0.10, 0.50, 0.15, 0.45, 0.05, 0.30)
+CERTAIN, MAYBE = (0.20, 0.22, 0.19, 0.21, 0.20, 0.18), (0.10, 0.50, 0.15, 0.45, 0.05, 0.30)
 
 
 @pytest.mark.parametrize(
     ("left", "x", "lag_is_probable", "leads"),
     [
-        (SURELY, 0.5, False, "sensor-lag"),  # a tenth more, in each drop
-        (SURELY, 1.0, True, "sensor-clock-offset"),  # at an end of its range
+        (CERTAIN, 0.5, False, "sensor-lag"),  # a tenth more, in each drop
+        (CERTAIN, 1.0, True, "sensor-clock-offset"),  # at an end of its range
         (MAYBE, 0.5, False, "sensor-clock-offset"),  # more, maybe by chance of the drops: what is left tells
         (MAYBE, 0.5, True, "sensor-lag"),
         ((0.9, 0.9, 0.9, 0.9, 0.9, 0.9), 0.5, True, "sensor-clock-offset"),  # surely less, whatever is left
@@ -192,10 +192,10 @@ def test_many_scales_are_told_by_the_least_and_the_most() -> None:
     assert "no more than the references miss" in said
 
 
-@pytest.mark.parametrize(("low", "is_told"), [(0.12, True), (-0.05, False)])
-def test_a_part_surely_predicted_is_named_within_the_tolerance(low: float, is_told: bool) -> None:
+@pytest.mark.parametrize(("low", "is_estimated"), [(0.12, True), (-0.05, False)])
+def test_a_part_surely_predicted_is_named_within_the_tolerance(low: float, is_estimated: bool) -> None:
     candidate = fitted("sensor-bias", SOME).candidates[-1]
     best = (candidate, Share(share=0.35, low=low, high=0.58))
     said = usual_model_error_sentence({"ground/sinkage": 0.021}, 1e-9, 6, best)
     assert "2.1% of ground/sinkage" in said
-    assert ("predicted by sensor-bias: 35% (12% to 58%)" in said) is is_told
+    assert ("predicted by sensor-bias: 35% (12% to 58%)" in said) is is_estimated

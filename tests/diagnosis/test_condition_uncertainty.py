@@ -145,11 +145,11 @@ def test_what_a_tolerance_covers_is_no_mismatch() -> None:
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 def test_a_recording_says_what_it_leaves_uncertain(suffix: str, tmp_path: Path) -> None:
     _, r = recorded({}, 1, speeds=(2.0,))[0]
-    doubt = {"initiation.speed": 0.05, "initiation.velocity": (0.1, 0.2, 0.3)}
-    told = replace(r, uncertainty=doubt, clock=Clock(zero="unknown", within=0.004))
+    uncertain = {"initiation.speed": 0.05, "initiation.velocity": (0.1, 0.2, 0.3)}
+    told = replace(r, uncertainty=uncertain, clock=Clock(zero="unknown", within=0.004))
     write_recording(told, tmp_path / f"one{suffix}")
     again = read_recording(tmp_path / f"one{suffix}")
-    assert again.uncertainty == doubt
+    assert again.uncertainty == uncertain
     assert again.clock == told.clock
     e = dataset_of("one", again, simulator_of(scenario(), again))
     assert e is not None

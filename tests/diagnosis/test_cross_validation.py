@@ -59,9 +59,9 @@ def test_the_best_fit_is_cross_validated_by_refits_if_unsure() -> None:
     assert held_out(rival, groups).chi2.sum() < held_out(lead, groups).chi2.sum() < 1.2**2 * lead.chi2
     asked: list[Any] = []
 
-    def parallel_map(problem: Problem, look: Any, things: Sequence[Any]) -> list[Any]:
+    def parallel_map(problem: Problem, scan: Any, things: Sequence[Any]) -> list[Any]:
         asked.append(list(things))
-        return serial_map(problem, pickle.loads(pickle.dumps(look)), things)  # as it is sent to children
+        return serial_map(problem, pickle.loads(pickle.dumps(scan)), things)  # as it is sent to children
 
     inquiry = cast(
         Inquiry, SimpleNamespace(problem=problem, groups=groups, executor=SimpleNamespace(parallel_map=parallel_map))

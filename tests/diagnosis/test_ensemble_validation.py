@@ -251,9 +251,9 @@ def test_a_base_is_begun_where_its_rivals_are() -> None:
     """A base whose clock was bent far off, and leaves more there than where the clock says."""
     rng = np.random.default_rng(5)
     problem = Problem([dataset(0, 0.0, 0.1 * rng.standard_normal(N))])
-    bent = problem.block(0, (), (), 3.0 * problem.dataset[0].shift_prior, problem.effort.fine)
-    assert bent is not None
-    base = Fitted(candidates=(), x=(), blocks=(bent,))
+    curved = problem.block(0, (), (), 3.0 * problem.dataset[0].shift_prior, problem.effort.fine)
+    assert curved is not None
+    base = Fitted(candidates=(), x=(), blocks=(curved,))
     assert restarted_base(problem, base).blocks[0].shift == 0.0
     assert with_shifts_near_prior(problem, base).blocks[0].shift == problem.dataset[0].shift_prior
     good = restarted_base(problem, base)

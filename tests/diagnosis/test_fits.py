@@ -78,14 +78,14 @@ def test_about_a_jump_lie_the_samples_that_it_may_fall_to() -> None:
 
 def test_a_second_contact_is_masked_at_any_time_shift() -> None:
     """Its force jumps by a third of the peak between two samples whose steps are as large: no two of them show it."""
-    ringing = {
+    oscillation = {
         "effects.structural-compliance.stiffness": 1.54e6,
         "effects.structural-compliance.damping": 78.0,
         "effects.structural-compliance.nose_share": 0.074,
     }
-    problem = problem_of(recorded(ringing, speeds=(2.0,), noise=3e-3, rate=900.0))
+    problem = problem_of(recorded(oscillation, speeds=(2.0,), noise=3e-3, rate=900.0))
     c = candidate(problem, "structural-compliance").whole()
-    x = tuple(coordinate(ringing[f"effects.{c.id}.{p}"], s) for p, s in c.search.items())
+    x = tuple(coordinate(oscillation[f"effects.{c.id}.{p}"], s) for p, s in c.search.items())
     shifts = problem.shifts[0] + np.arange(-1.0e-3, 1.0e-3, 5e-5)
     blocks = [problem.block(0, (c,), x, float(s), 0.0) for s in shifts]
     left = np.array([b.total for b in blocks if b is not None])
@@ -155,9 +155,9 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
         c = candidate(problem_of(recordings), key)
         tasks.append(Task(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=3))
     alone = Executor().fits(problem_of(recordings), tasks)
-    look = partial(_best_middle, beside=(), shifts=(0.0, 0.0), most=math.inf)
+    scan = partial(_best_middle, beside=(), shifts=(0.0, 0.0), most=math.inf)
     things = [(task.candidates[0], task.candidates[0].starts()) for task in (*tasks, tasks[0])]
-    seen = Executor().parallel_map(problem_of(recordings), look, things)
+    seen = Executor().parallel_map(problem_of(recordings), scan, things)
     with Executor(workers) as many:
         assert many.fits(problem_of(recordings), tasks)[0] is not None  # in this process: none has begun
         assert many.children._pool is None
@@ -167,7 +167,7 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
             time.sleep(0.1)
         problem = problem_of(recordings)
         together = many.fits(problem, tasks)
-        assert many.parallel_map(problem, look, things) == seen
+        assert many.parallel_map(problem, scan, things) == seen
         assert many.each(math.factorial, range(9)) == [math.factorial(k) for k in range(9)]
         assert not problem._raw  # nothing was simulated here
         assert many.children._pool is not None
@@ -285,7 +285,7 @@ def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> 
     begun = problem.fit((rate,), (0.5,))
     assert begun is not None
     shifts, variant = tuple(b.shift for b in begun.blocks), rate.variants()[0]
-    task = Task(how="shape", candidates=(rate,), start=begun.x, shifts=shifts, variant=variant)
+    task = Task(how="secondary", candidates=(rate,), start=begun.x, shifts=shifts, variant=variant)
     found = []
     for _ in range(2):
         with Executor(notebook=tmp_path / "notes") as one:

@@ -97,7 +97,7 @@ def test_what_goes_its_own_way_is_no_unit_error() -> None:
     assert inconsistencies(made) == ([], [])
 
 
-@pytest.mark.parametrize(("apart", "is_slip"), [(0.6, True), (0.8, False)])
+@pytest.mark.parametrize(("apart", "is_unit_error"), [(0.6, True), (0.8, False)])
 def test_what_perturbed_runs_do_as_well_is_no_unit_error(apart: float, is_unit_error: bool) -> None:
     """Runs that nobody could tell apart, by so much of a channel: 0.71 of it leave |r| = 0.7."""
     made = mistaken(recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS), FORCE, -1.0)

@@ -96,8 +96,8 @@ def test_slopes_that_the_mean_of_runs_has_too_are_believed(share: float, is_look
     assert found == pytest.approx((1.0 / np.sqrt(share),) * 2 if is_looked_at else (0.0, 0.0), rel=1e-9)
 
 
-@pytest.mark.parametrize(("scatter", "is_told"), [(0.0, True), (57.0, False)])
-def test_chance_slopes_of_the_ensemble_mean_are_not_believed(scatter: float, is_told: bool) -> None:
+@pytest.mark.parametrize(("scatter", "is_estimated"), [(0.0, True), (57.0, False)])
+def test_chance_slopes_of_the_ensemble_mean_are_not_believed(scatter: float, is_estimated: bool) -> None:
     """The mean keeps all of J, |J|^2 = 1.96^2, but h_11 = 1/4260 of what runs scatter by is a fifth of that.
 
     They do to one side at half the places, 1, 4, 8, 12, 32 on either side, and to the other at the rest.
@@ -108,7 +108,7 @@ def test_chance_slopes_of_the_ensemble_mean_are_not_believed(scatter: float, is_
         to = 1.0 if abs(t) in (1.0, 4.0, 8.0, 12.0, 32.0) else -1.0
         return [-t * 1.96 * DIP + to * scatter * ACROSS]
 
-    assert reach(left) == ((0.0, 0.0) if is_told else None)
+    assert reach(left) == ((0.0, 0.0) if is_estimated else None)
 
 
 def test_samples_count_alike_at_all_points_and_no_clock_does() -> None:

@@ -19,7 +19,7 @@ from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import ended, with_time_shift_search
-from rollover.diagnosis.fit.model_variants import with_fitted_shape
+from rollover.diagnosis.fit.model_variants import with_fitted_secondary
 from rollover.diagnosis.fit.parameterisation import coordinate, coordinates
 from rollover.diagnosis.fit.step import Inquiry, Screened, Step
 from rollover.diagnosis.fit.threshold_scan import threshold_ranges, with_threshold_traced
@@ -140,7 +140,7 @@ def test_a_nose_is_found_along_the_ridge_of_its_frequency(tmp_path: Path) -> Non
     plain = problem.fit((c,), [coordinate(share[name], s) for name, s in c.search.items()])
     assert plain is not None
     assert plain.chi2 > 4.0 * sum(e.count for e in problem.dataset)
-    found = with_fitted_shape(problem, plain, [b.total for b in plain.blocks])
+    found = with_fitted_secondary(problem, plain, [b.total for b in plain.blocks])
     assert found is not None
     assert found.chi2 < 1.1 * sum(e.count for e in problem.dataset)
     assert found.candidates[-1].along == ()
@@ -178,7 +178,7 @@ def test_the_share_of_an_unweighed_nose_is_found() -> None:
     plain = problem.fit((c,), begun, shifts=[0.0] * 3)
     assert plain is not None
     assert plain.chi2 > 2.0 * count
-    found = with_fitted_shape(problem, plain, [b.total for b in plain.blocks])
+    found = with_fitted_secondary(problem, plain, [b.total for b in plain.blocks])
     assert found is not None
     assert found.chi2 < 1.1 * count
     told = found.candidates[-1].values(found.x)
@@ -227,8 +227,8 @@ def test_an_oscillatory_effect_is_traced_along_its_ridge(tmp_path: Path) -> None
     x = [coordinate(ended[name], s) for name, s in c.search.items()]
     stopped = problem.fit((c,), x, rounds=0, shifts=[0.0] * len(case.recordings))
     assert stopped is not None
-    bent, own = c.reshaped(x)
-    assert bent.plain(own)[1] == pytest.approx(x)
+    curved, own = c.reshaped(x)
+    assert curved.plain(own)[1] == pytest.approx(x)
     assert [k for k, _, _ in threshold_ranges(stopped)] == [2, 2]
     found = min((with_threshold_traced(problem, stopped, s) for s in threshold_ranges(stopped)), key=lambda f: f.chi2)
     assert found.chi2 < stopped.chi2 - 20.0
@@ -280,7 +280,7 @@ def test_an_abrupt_effect_is_led_by_its_smooth_shape(tmp_path: Path) -> None:
     for begun in ((0.8125, 0.875), (0.0625, 0.125)):
         stuck = problem.fit((c,), begun)
         assert stuck is not None
-        found = with_fitted_shape(problem, stuck, [b.total for b in stuck.blocks])
+        found = with_fitted_secondary(problem, stuck, [b.total for b in stuck.blocks])
         assert found is not None
         assert found.candidates == (c,), "its usual shape"
         gains.append(stuck.chi2 - found.chi2)
@@ -372,7 +372,7 @@ def test_a_start_that_soon_beats_the_fit_goes_on() -> None:
 def test_a_time_shift_in_another_minimum_restarts(dips: tuple[float, float], began: float, met: float) -> None:
     """Edges leave it in the second of two dips, 0.1 ms to either side, that leaves 11 where the first leaves 10."""
 
-    def block(_r: int, _c: Any, _x: Any, shift: float, _nudge: float, *, clock: bool) -> Any:
+    def block(_r: int, _c: Any, _x: Any, shift: float, _step: float, *, clock: bool) -> Any:
         left = min(k + min(abs(shift - dip) / 1e-4, 1.0) for k, dip in enumerate(dips)) + 10.0
         return SimpleNamespace(total=left, shift=shift, prior=1e-3)
 

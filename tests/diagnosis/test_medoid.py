@@ -24,7 +24,7 @@ from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.forward import full_run
 from rollover.diagnosis.forward.full_run import CENTRE, Made, Making, RunSimulator
 from rollover.diagnosis.inference import intervals as intervals_of
-from rollover.diagnosis.inference.intervals import ensemble_variance, intervals, shape_variance
+from rollover.diagnosis.inference.intervals import ensemble_variance, intervals, secondary_variance
 from rollover.diagnosis.selection.ensemble_validation import refined_under_scatter
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
@@ -97,9 +97,9 @@ def test_a_shape_that_is_not_fitted_widens_an_interval(monkeypatch: pytest.Monke
     block = problem.block(0, (SLOPE,), (0.4,), 0.0, problem.effort.fine)
     assert block is not None
     inverse = np.linalg.inv(block.J.T @ block.J)
-    found = shape_variance(problem, Fitted(candidates=(alone,), x=(0.4,), blocks=(block,)), inverse)
+    found = secondary_variance(problem, Fitted(candidates=(alone,), x=(0.4,), blocks=(block,)), inverse)
     assert found[0] == pytest.approx(1.0 / 12.0, rel=0.05)
-    assert shape_variance(problem, Fitted(candidates=(SLOPE,), x=(0.4,), blocks=(block,)), inverse) == 0.0
+    assert secondary_variance(problem, Fitted(candidates=(SLOPE,), x=(0.4,), blocks=(block,)), inverse) == 0.0
 
 
 def test_no_perturbed_run_is_the_run_itself(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,7 +25,7 @@ Place = tuple[float, float]
 WAVES = np.sin(30.0 * TIME), np.cos(70.0 * TIME)
 
 
-class Bent(Late):
+class Curved(Late):
     """y = 40 (x + bend x^2) sin(30 t) + 40 o cos(70 t); `asked` are the (x, o) of its runs, in their order."""
 
     def __init__(self, bend: float) -> None:
@@ -37,14 +37,14 @@ class Bent(Late):
         return {CHANNEL: 40.0 * (x + self.bend * x**2) * WAVES[0] + 40.0 * o * WAVES[1]}
 
 
-def problem_of(x: float, o: float, bend: float = 0.0, effort: Any = SETTINGS.forward.runs) -> tuple[Problem, Bent]:
-    runs = Bent(bend)
+def problem_of(x: float, o: float, bend: float = 0.0, effort: Any = SETTINGS.forward.runs) -> tuple[Problem, Curved]:
+    runs = Curved(bend)
     values = runs.predict({"effects.slope.angle": x, "effects.mass.added": o}, 0.0)[CHANNEL]
     runs.asked.clear()
     return Problem([dataset(values, runs, effort)]), runs
 
 
-def beside(runs: Bent, at: Place) -> set[Place]:
+def beside(runs: Curved, at: Place) -> set[Place]:
     """Runs to either side of a place, of those that a slope asks for where a fit ends."""
     x, o = at
     sides = {

@@ -256,7 +256,7 @@ def test_directions_may_be_those_beside_another_fit() -> None:
     assert 0.0 < found.score < 0.1 * known.score  # most is explained
 
 
-@pytest.mark.parametrize(("hint", "is_ensemble", "looks_made"), [(0.9, True, 1), (0.01, True, 2), (0.9, False, 1)])
+@pytest.mark.parametrize(("hint", "is_ensemble", "scores_made"), [(0.9, True, 1), (0.01, True, 2), (0.9, False, 1)])
 def test_no_screening_beside_a_model_without_usable_runs(
     hint: float, is_ensemble: bool, scores_made: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -310,9 +310,9 @@ def test_the_smaller_of_two_split_p_values_is_uniform(
     base = problem_of((0.0,) * 4, (0.0,) * 4)[1]
     base = replace(base, blocks=tuple(replace(b, expected=expected) for b in base.blocks))
 
-    def told(before: float, look: float) -> float:
+    def told(before: float, scan: float) -> float:
         one: Any = SimpleNamespace(p_value=before)
-        other: Any = SimpleNamespace(p_value=lambda: look)
+        other: Any = SimpleNamespace(p_value=lambda: scan)
         found = Explanation(base=base, fitted=base, parts=(), scored=other, detectable={}, before=one, after=one)
         return found.p_value
 

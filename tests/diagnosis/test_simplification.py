@@ -63,10 +63,10 @@ def test_rivals_restart_beside_the_best_models_variant() -> None:
         return [fitted(task.candidates[-1].id, 4.0, task.start) for task in tasks]
 
     best, rival = fitted("soil-layer", 1.0, (0.7, 0.0, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
-    bent = replace(rival.candidates[0], search={"a": Search(0, 1), "b": Search(0, 1)})
-    stood = replace(rival, candidates=(bent, rival.candidates[1]), x=(0.2, 0.5, 0.4))
+    curved = replace(rival.candidates[0], search={"a": Search(0, 1), "b": Search(0, 1)})
+    stood = replace(rival, candidates=(curved, rival.candidates[1]), x=(0.2, 0.5, 0.4))
     found = step(best, stood)
-    found = replace(found, base=replace(found.base, candidates=(bent,), x=(0.2, 0.5)))
+    found = replace(found, base=replace(found.base, candidates=(curved,), x=(0.2, 0.5)))
     there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[]))
     simplification._with_rivals(there, found)
     simplification.simpler(there, found)

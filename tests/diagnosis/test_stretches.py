@@ -53,9 +53,9 @@ class Overturn:
     contact = float("inf")
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array]:
-        bent = sum(changes.values()) * np.sin(np.pi * TIME / IMPACT) ** 2 * ~LATE
+        curved = sum(changes.values()) * np.sin(np.pi * TIME / IMPACT) ** 2 * ~LATE
         course = 0.5 - 0.5 * np.cos(np.pi * TIME / TIME[-1])
-        return dict.fromkeys((ROLL, RATE), self.side * course + bent)
+        return dict.fromkeys((ROLL, RATE), self.side * course + curved)
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         return ((0.0, "tipping"), (IMPACT, "impact"))

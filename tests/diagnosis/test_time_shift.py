@@ -71,23 +71,23 @@ def test_the_onset_is_not_biased_by_missing_physics(missing: dict[str, object]) 
     estimate_time_shifts(problem)
     base = problem.fit((), ())
     assert base is not None
-    bent = np.array([b.shift for b in base.blocks]) - truth
+    curved = np.array([b.shift for b in base.blocks]) - truth
     early = np.array([np.nan if v is None else v for v in shifts_from_contact(problem, (), ())]) - truth
-    assert np.abs(bent).max() > 0.6e-3  # a whole recording's shift eats part of it
+    assert np.abs(curved).max() > 0.6e-3  # a whole recording's shift eats part of it
     assert np.abs(early).max() < 0.25e-3
 
 
 @pytest.mark.parametrize("late", [-0.008, 0.013])
 def test_the_onset_of_contact_is_found_whatever_happens_then(late: float) -> None:
     """A striker that gives way rings from the first instant, and its recorder's clock has no zero."""
-    ringing = {"effects.structural-compliance.stiffness": 1.9e6, "effects.structural-compliance.damping": 1400.0}
-    problem = without_zero(problem_of(ringing, late=late))
+    oscillation = {"effects.structural-compliance.stiffness": 1.9e6, "effects.structural-compliance.damping": 1400.0}
+    problem = without_zero(problem_of(oscillation, late=late))
     estimate_time_shifts(problem)
     base = problem.fit((), ())
     assert base is not None
-    bent = np.array([b.shift for b in base.blocks]) - late
+    curved = np.array([b.shift for b in base.blocks]) - late
     early = np.array([np.nan if v is None else v for v in shifts_from_contact(problem, (), ())]) - late
-    assert np.abs(bent).max() > 2e-3
+    assert np.abs(curved).max() > 2e-3
     assert np.abs(early).max() < 1.3e-3  # the clocks themselves stray by half a millisecond
 
 

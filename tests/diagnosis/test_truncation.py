@@ -92,14 +92,14 @@ def test_an_end_that_counts_is_kept() -> None:
     assert shortened(replace(plain, signals=(replace(plain.signals[0], weight=None),))).recording.time.size == 1000
 
 
-@pytest.mark.parametrize(("off", "is_kept"), [(0.0, False), (1.5, False), (2.5, True)])
-def test_a_light_end_stays_where_it_differs_significantly(off: float, is_kept: bool) -> None:
+@pytest.mark.parametrize(("off", "stays"), [(0.0, False), (1.5, False), (2.5, True)])
+def test_a_light_end_stays_where_it_differs_significantly(off: float, stays: bool) -> None:
     """Samples of noise 1 that count 0.3, of runs that differ by 1: (0.3 off)^2 against 3 (0.3^2 + 0.3^2)."""
     whole = dataset(0.3, off=off)
     one = np.ones(whole.signals[0].rows.size)
     even = replace(whole.signals[0], level=one)
     found = shortened(replace(whole, signals=(even,), perturbed=(one, -one)))
-    assert (found.recording.time.size == whole.recording.time.size) == is_kept
+    assert (found.recording.time.size == whole.recording.time.size) == stays
 
 
 def test_of_one_recording_nothing_after_the_impact_counts() -> None:

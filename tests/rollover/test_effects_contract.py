@@ -185,7 +185,7 @@ def test_effect_numbers_have_units_bounds_and_search_ranges(effect: type[Effect]
 
 @each
 def test_fit_traits_are_of_fitted_parameters(effect: type[Effect]) -> None:
-    assert set(effect.shapes) < set(effect.search), "a strength is left to fit"
+    assert set(effect.secondary) < set(effect.search), "a strength is left to fit"
     assert set(effect.local_starts) <= set(effect.search)
     assert all(0.0 <= place <= 1.0 for places in effect.local_starts.values() for place in places)
     assert set(effect.grows) <= set(effect.search)
@@ -290,10 +290,14 @@ def test_an_id_given_twice_is_an_error() -> None:
         "try:\n"
         "    type('Nameless', (Effect,), {'id': ''})\n"
         "except TypeError as error: print(error)\n"
+        "try:\n"
+        "    type('Old', (Effect,), {'id': 'old', 'shapes': ('a',)})\n"
+        "except TypeError as error: print(error)\n"
     )
-    twice, nameless = outside("-c", program).stdout.splitlines()
+    twice, nameless, old = outside("-c", program).stdout.splitlines()
     assert "'soil-layer' is taken by rollover.effects.ground" in twice
     assert "needs an `id`" in nameless
+    assert "`shapes` is named `secondary`" in old
 
 
 def test_the_listing_shows_what_each_effect_is() -> None:

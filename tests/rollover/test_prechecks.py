@@ -157,7 +157,7 @@ def test_a_planted_fault_is_found(fault: Fault, check: str, channel: str) -> Non
     assert seen >= 4
 
 
-@pytest.mark.parametrize(("corner", "leap"), [(6.0, 0.0), (10.0, 0.0), (0.0, 8.0), (0.0, 12.0)])
+@pytest.mark.parametrize(("corner", "jump"), [(6.0, 0.0), (10.0, 0.0), (0.0, 8.0), (0.0, 12.0)])
 def test_a_corner_and_a_jump_are_no_spikes(corner: float, jump: float) -> None:
     """A force that turns from one sample to the next, or jumps: what comes before says the sample beside it."""
     k = np.arange(N) - 0.4 * N

@@ -77,7 +77,7 @@ class Candidate:
     @property
     def has_secondary(self) -> bool:
         """Whether secondary parameters are fitted too, or a variant of it is."""
-        return bool(self.variant) or not set(self.search).isdisjoint(EFFECTS[self.id].shapes)
+        return bool(self.variant) or not set(self.search).isdisjoint(EFFECTS[self.id].secondary)
 
     def is_fine(self, k: int) -> bool:
         """Whether the k-th parameter says where a local effect acts: scanned finely, over less about each point."""
@@ -199,7 +199,7 @@ class Candidate:
     def reshaped(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
         """The same along its shape as far as that is fitted, and its coordinates there: the way back from `plain`."""
         kind, values = EFFECTS[self.id], self.values(x)
-        names = tuple(name for name in self.search if name in kind.shapes)
+        names = tuple(name for name in self.search if name in kind.secondary)
         for name in names:
             values = {**kind.reshaped(values, name, getattr(kind(), name)), name: values[name]}
         return replace(self, along=names), coordinates(values, self.search)
@@ -222,7 +222,7 @@ class Candidate:
         """Coordinates of `whole` at which its fit may begin: the defaults of the secondary parameters, and others."""
         kind: Any = EFFECTS[self.id]()
         default = [_begun(getattr(kind, n), s) for n, s in self.secondary.items()]
-        points = [tuple(default), *itertools.product(*[TUNING.shape_starts] * len(default))]
+        points = [tuple(default), *itertools.product(*[TUNING.secondary_starts] * len(default))]
         return [(*x, *point) for point in points]
 
     def scan_points(self) -> list[tuple[float, ...]]:

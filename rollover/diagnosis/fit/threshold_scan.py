@@ -31,7 +31,7 @@ def threshold_ranges(fitted: Fitted) -> list[Stretch]:
     last, at = fitted.candidates[-1], len(fitted.x) - len(fitted.own)
     strength = strength_parameter(last.id, last.search)[0]
     if last.is_oscillatory:
-        names = [name for name in last.search if name in EFFECTS[last.id].shapes]
+        names = [name for name in last.search if name in EFFECTS[last.id].secondary]
     else:
         names = [name for name in last.search if (name == strength) == is_clock(fitted)]
     points = [at + list(last.search).index(name) for name in names]

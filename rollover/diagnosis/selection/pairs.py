@@ -22,7 +22,7 @@ from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far, score_candidates
 from rollover.diagnosis.selection.simplification import (
     followed,
-    in_usual_shape,
+    in_usual_form,
     is_over_flexible,
     mirror_images,
     simpler,
@@ -228,7 +228,7 @@ def _with_secondary_fitted(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fi
     lead = min(pairs, key=lambda f: f.chi2)
     near = [f for f in able if f.chi2 < TUNING.same_misfit * lead.chi2 and f.candidates[-1].secondary]
     leaves = tuple(b.total for b in lead.blocks)
-    made = inquiry.fits([replace(continued_from(f, "shape"), leaves=leaves) for f in near])
+    made = inquiry.fits([replace(continued_from(f, "secondary"), leaves=leaves) for f in near])
     return [f for f in made if f is not None]
 
 
@@ -262,9 +262,7 @@ def _mirrored(inquiry: Inquiry, pair: Fitted) -> list[Fitted]:
         if not EFFECTS[way.candidates[-1].id].mirrors:
             continue
         other = way.candidates[0]
-        (other, _), x = in_usual_shape(
-            way, usual, (0,) if usual[other.key].search.keys() <= other.search.keys() else ()
-        )
+        (other, _), x = in_usual_form(way, usual, (0,) if usual[other.key].search.keys() <= other.search.keys() else ())
         found += mirror_images(inquiry, way, (other,), x[: len(other.search)])
     return found
 

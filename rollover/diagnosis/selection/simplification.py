@@ -120,7 +120,7 @@ def _with_usual_secondary(inquiry: Inquiry, found: Step) -> Step | None:
         return None
     shifts, ways = tuple(b.shift for b in best.blocks), [varied, *([k] for k in varied if len(varied) > 1)]
     tasks = [
-        Task(candidates=c, start=x, shifts=shifts, width=1) for c, x in (in_usual_shape(best, usual, w) for w in ways)
+        Task(candidates=c, start=x, shifts=shifts, width=1) for c, x in (in_usual_form(best, usual, w) for w in ways)
     ]
     fits = [f for f in inquiry.fits(tasks) if f is not None and _is_as_good(f, best)]
     if not fits:
@@ -213,7 +213,7 @@ def _mirrors(
             yield c, coordinates(there, c.search)
 
 
-def in_usual_shape(
+def in_usual_form(
     fitted: Fitted, usual: Mapping[str, Candidate], which: Sequence[int]
 ) -> tuple[tuple[Candidate, ...], tuple[float, ...]]:
     """Effects of a fit, `which` of them in their usual shape, and where they stand."""
