@@ -226,7 +226,7 @@ def _beside_estimated_discrepancy(
 
 
 def _is_reproduced(found: Conclusion) -> bool:
-    """Whether what nothing explains carries over to recordings that were held out, by its course or by a law."""
+    """Whether the unexplained residual carries over to recordings that were held out, as it is or by a law."""
     problem, scenario = found.problem, found.asked.scenario
     if scenario is None or found.acts != "drop":
         return False  # nothing predicts the course of an overturn but a run

@@ -184,7 +184,7 @@ def test_rivals_of_a_family_or_within_the_discrepancy_stay(monkeypatch: pytest.M
     assert [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)] == ["soil-layer"]
 
 
-def test_many_scales_are_told_by_the_least_and_the_most() -> None:
+def test_many_scales_are_stated_by_the_least_and_the_most() -> None:
     scales = {f"c{k}": 0.01 * (k + 1) for k in range(9)}
     said = usual_model_error_sentence(scales, 1e-9, 4, taught=True)
     assert "a taught background (1 sigma, of the range: 1.0% of c0 to 9.0% of c8)" in said

@@ -139,7 +139,7 @@ def test_loading_starts_at_onset_where_shifts_absorbed_it(
     assert worst() > 3.0
 
 
-def test_a_sensor_dropout_is_told_from_a_force_by_its_timing() -> None:
+def test_a_sensor_dropout_differs_from_a_force_by_its_timing() -> None:
     rng, made = np.random.default_rng(3), []
     for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
         y = r.channels[drops.FORCE].copy()

@@ -202,7 +202,7 @@ def test_a_diverged_run_counts_as_one_state_of_unknown_size() -> None:
     assert has_diverged(found)
 
 
-def test_no_more_is_weighed_down_than_there_is() -> None:
+def test_no_more_is_weighted_down_than_there_is() -> None:
     """The middle channel leaves more than all on the average: what counts is E + d ln(1 + x/d), and never less."""
     e = blown((*CHANNELS, "chassis/angular_velocity_y"))
     w = misfit(e, [6.0, 6.0, 6.0, 0.3, 0.3])
@@ -273,7 +273,7 @@ def test_what_begins_after_its_impact_counts_in_full() -> None:
     assert heavy_tail(replace(e, first_impact=float(e.recording.time[0])), w) is None
 
 
-def test_p_values_are_uniform_where_divergence_is_weighed_down() -> None:
+def test_p_values_are_uniform_where_divergence_counts_less() -> None:
     """Four waves in each of four channels, of recordings and neighbours of one law.
 
     What counts less in a recording that goes a little further than expected must count less in what it is held against;

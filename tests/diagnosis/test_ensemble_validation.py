@@ -312,7 +312,7 @@ def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyP
     assert len(found.rivals) == 2
 
 
-def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_strength_whose_interval_holds_null_is_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, asked = Problem([dataset(0, 0.1, np.zeros(N))]), list[Any]()
     layer = replace(
         candidate("soil-layer", "physics", "depth"),

@@ -329,7 +329,7 @@ def test_far_from_noise_a_fit_stops_at_a_small_gain(monkeypatch: pytest.MonkeyPa
     assert y == pytest.approx(x, abs=1e-3)
 
 
-def test_a_strength_is_told_in_what_is_usual() -> None:
+def test_a_strength_is_stated_in_what_is_usual() -> None:
     """A gain's usual error is 3 %, an axis is turned by 0.05 rad; a threshold that nothing is null of says nothing."""
     problem = problem_of(recorded({}, speeds=(2.0,), channels=(FORCE, ACCELERATION)))
     cases = {

@@ -36,7 +36,7 @@ def louder(recordings: list[tuple[str, Recording]], seed: int) -> list[tuple[str
     return found
 
 
-def test_its_law_is_told_from_the_samples_alone() -> None:
+def test_its_law_is_estimated_from_the_samples_alone() -> None:
     quiet = recorded({"effects.soil-crust.thickness": 0.03}, noise=0.0, rate=2000.0, channels=CHANNELS)
     for e, (_, clean) in zip(with_variance_model(problem_of(louder(quiet, 1)).dataset), quiet, strict=True):
         for s in e.signals:

@@ -47,7 +47,7 @@ def test_an_unfitted_exponent_widens_the_strengths_interval() -> None:
 
 
 @pytest.mark.parametrize("flatter", [1.0, 4.0])
-def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float) -> None:
+def test_an_interval_extends_as_far_as_the_misfit_stays_low(flatter: float) -> None:
     """Slopes say |w - J dx|^2 with J = 40, the misfit rises as if J were `flatter` times less: a parabola as wide."""
     J, n = 40.0, 50
     rng = np.random.default_rng(1)

@@ -63,7 +63,7 @@ def straight(t: float, flatter: float, least: float = 0.0) -> list[Array]:
         (lambda t: None if t < -0.5 else straight(t, 5.0), 5.0, 5.0, 12),  # the range ends there: four are too few
     ],
 )
-def test_an_interval_reaches_as_far_as_the_mean_of_runs_says(
+def test_an_interval_extends_as_far_as_the_mean_of_runs_says(
     of: Callable[[float], list[Array] | None], down: float, up: float, places: int
 ) -> None:
     seen: list[float] = []
@@ -72,7 +72,7 @@ def test_an_interval_reaches_as_far_as_the_mean_of_runs_says(
 
 
 @pytest.mark.parametrize("of", [lambda t: straight(t, 1e3), lambda t: None])
-def test_what_does_not_rise_within_32_places_is_not_told(of: Callable[[float], list[Array] | None]) -> None:
+def test_what_does_not_rise_within_32_points_has_no_interval(of: Callable[[float], list[Array] | None]) -> None:
     seen: list[float] = []
     assert reach(of, seen) is None
     assert len(seen) == 20

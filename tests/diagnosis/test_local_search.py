@@ -237,7 +237,7 @@ def test_an_oscillatory_effect_is_traced_along_its_ridge(tmp_path: Path) -> None
 
 
 def test_a_pair_that_leaves_nothing_is_named_by_both() -> None:
-    """A crust and a guide that rubs, recorded from full runs: these meet the crust's end a step late."""
+    """A crust and guide friction, recorded from full runs: these meet the crust's end a step late."""
     hidden = {"effects.soil-crust.thickness": 0.03, "effects.guide-friction.force": 40.0}
     made = []
     for seed, speed in enumerate((1.2, 1.5, 2.0, 2.5, 3.0, 3.4), start=1):
@@ -291,7 +291,7 @@ def test_an_abrupt_effect_is_led_by_its_smooth_shape(tmp_path: Path) -> None:
 
 
 def test_two_effects_without_a_first_are_tried_together() -> None:
-    """A heavier striker on a guide that rubs: a stiffness and the mass led, and friction beside the first."""
+    """A heavier striker with guide friction: a stiffness and the mass led, and friction beside the first."""
     hidden = {"effects.mass.added": 2.3, "effects.guide-friction.force": 31.0}
     problem = problem_of(recorded(hidden, 1, speeds=(1.4, 2.0, 2.6, 3.2), rate=1000.0, noise=0.003, channels=CHANNELS))
     c = {name: candidate(problem, name) for name in ("mass", "soil-stiffness", "guide-friction")}
@@ -343,7 +343,7 @@ def test_a_fit_is_ended_finely_whatever_others_may_leave(monkeypatch: pytest.Mon
     assert ended(problem, coarse).chi2 < fine.chi2 + 0.05
 
 
-def test_a_start_that_soon_beats_the_fit_goes_on() -> None:
+def test_a_start_that_beats_the_fit_in_few_rounds_goes_on() -> None:
     """Short fits to few recordings, one from the fit itself: what it gains on these alone others must gain too."""
     block = SimpleNamespace(shift=0.0)
     fitted = cast(Fitted, SimpleNamespace(candidates=(), x=(0.5,), blocks=(block, block, block)))

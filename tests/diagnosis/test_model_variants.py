@@ -89,7 +89,7 @@ def test_of_short_fits_to_one_minimum_one_goes_on(near: list[tuple[float, float]
 @pytest.mark.parametrize(
     ("left", "short_fit", "is_followed"), [(30.0, 29.0, False), (30.0, 28.0, True), (3.0, 2.99, True), (3.0, 2.6, True)]
 )
-def test_far_from_noise_a_variant_that_soon_gains_is_followed(left: float, short_fit: float, is_followed: bool) -> None:
+def test_far_from_noise_a_variant_that_gains_is_followed(left: float, short_fit: float, is_followed: bool) -> None:
     """Short fits leave so much of what the usual shape leaves: three in a hundred is nothing, seven is a part of it.
 
     Near noise, at three times what chance leaves, any little may be all there is.

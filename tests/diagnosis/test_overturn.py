@@ -258,7 +258,7 @@ def test_scatter_is_asked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [n for n in made if n > 1] == 2 * [1 + len(SETTINGS.forward.run.perturbations)]
 
 
-def test_the_motion_is_told_though_it_was_not_recorded() -> None:
+def test_the_motion_is_estimated_though_not_recorded() -> None:
     simulator = RunSimulator(toss(), recording(Z))
     state = simulator.state(0.002)
     whole = run()

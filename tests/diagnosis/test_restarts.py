@@ -144,7 +144,7 @@ def test_a_time_shift_is_that_of_the_lowest_minimum() -> None:
     assert moved.chi2 < late.chi2
 
 
-def test_a_misled_fit_restarts_and_goes_on_if_it_soon_gains() -> None:
+def test_a_misled_fit_restarts_and_goes_on_if_it_gains() -> None:
     """The base leaves 400 and the best 200: one comes to 290 in a few rounds and to 250 in the end, one to 310."""
     asked: list[Task] = []
 

@@ -278,7 +278,7 @@ def test_where_an_effect_ends_its_slope_is_that_of_both_sides() -> None:
     assert found.J[:, 0] == pytest.approx(0.5 * np.sin(90.0 * TIME) / SIGMA, abs=0.01 / SIGMA)
 
 
-def test_what_tells_only_near_its_place_is_looked_at_over_less() -> None:
+def test_a_local_parameter_is_varied_over_less() -> None:
     """y = g(t - c (x - x0)), g = exp(-(t/w)^2) with w = 2 ms, c = 0.1 s: over 0.03 of a coordinate it is gone.
 
     sum (g(t + ch) - g(t - ch))^2 = 2 (1 - exp(-2 (ch/w)^2)) sum g^2, over (2h sigma)^2: with h a quarter of 0.03 that

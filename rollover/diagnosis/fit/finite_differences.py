@@ -1,7 +1,7 @@
 """Slopes among runs that differ by chance: over both sides of a point, and over as wide a step as shows clearly more.
 
 Between two runs lies what the parameter does and what chance does. Over a narrow step that is mostly chance, which
-squares make look like a strong slope: steps too short, and intervals too narrow. Where a run jumps to another course on
+squares make look like a strong slope: steps too short, and intervals too narrow. Where a run jumps to another branch on
 one side, the other side alone tells what the parameter does. Where nothing is left to chance, as in drops, a narrow
 step is the better one, see `step_reduced`.
 

@@ -250,7 +250,7 @@ def _within_range(problem: Problem, fitted: Fitted, wide: Array, dispersion: flo
 
 
 def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: float) -> Array:
-    """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `local_quadratic_extents`.
+    """How far (p, 2) the mean of runs beside the fit may be what was measured, see `local_quadratic_extents`.
 
     In units of `own` deviations down and up, NaN where runs do not tell. It has in it what scatter and disagreement do.
     """

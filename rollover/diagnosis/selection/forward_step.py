@@ -230,7 +230,7 @@ def _elsewhere_of(base: Fitted) -> list[tuple[float, ...]]:
 
 
 def _robust_short_fits(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[int]) -> list[Fitted]:
-    """Fits to few recordings with other courses forgiven, as they stand in full.
+    """Fits to few recordings with diverged ones weighted down, as they stand in full.
 
     Where runs part ways what is left in full jumps from place to place, and a fit ends at the first dip.
     """

@@ -147,7 +147,7 @@ def _screened(
 
 
 def of_same_family(ranked: Sequence[Candidate], taken: int, leaders: int) -> list[Candidate]:
-    """Beyond the first that are `taken`, those akin to one of the `leaders` that move the vehicle."""
+    """Beyond the first that are `taken`, those of the family of one of the `leaders` that move the vehicle."""
     return same_family(ranked[taken:], [c for c in ranked if c.kind != "sensor"][:leaders])
 
 
@@ -234,7 +234,7 @@ def strong_starts(
     """Where those candidates act that leave least of `few` recordings where they act strongly, by key, the best first.
 
     What so strong an effect does is no multiple of what a little of it does: a vehicle rolls on, or no more. Where all
-    samples count in full what comes near is told best, with other courses forgiven what is still far off.
+    samples count in full what comes near is estimated best, with diverged ones weighted down what is far off.
     """
     shifts = initial_time_shifts(problem, base)
 

@@ -216,7 +216,7 @@ def validated_step(inquiry: Inquiry, found: Step, scored: ScoreTest) -> Step | N
 
 
 def with_other_weighting(inquiry: Inquiry, current: Fitted) -> Step | None:
-    """A step with recordings on another course counted in full where they were forgiven, or forgiven; None if none.
+    """A step with diverged recordings in full where they were weighted down, or weighted down; None if none.
 
     Chance could have sent several there, but so could what is missing; and where they went there may hide what shows
     before. If nothing lasts they are counted as they were.
