@@ -159,10 +159,7 @@ def _ways(fitted: Fitted, own: Array) -> list[Array]:
 
 
 def _rippled(fitted: Fitted) -> set[int]:
-    """Coordinates of effects in another shape or form than their usual one, which a threshold may make up for.
-
-    From sample to sample that a threshold passes the misfit rises and falls again, along a valley longer than one wave.
-    """
+    """Coordinates of effects in another form than their usual one: local minima of a threshold may make up for it."""
     secondary = (own for c, own in with_slices(fitted.candidates) if c.has_secondary)
     return {k for own in secondary for k in range(own.start, own.stop)}
 
@@ -345,9 +342,8 @@ def intervals(
     # a fit that ended before it was at rest is off by what the next step would have been
     rest = inverse @ sum((b.normal()[1] for b in fitted.blocks), np.zeros(p))
     if strayed:
-        moved += ensemble_variance(problem.dataset, fitted.blocks, inverse) + secondary_variance(
-            problem, fitted, inverse
-        )
+        held = secondary_variance(problem, fitted, inverse)
+        moved += ensemble_variance(problem.dataset, fitted.blocks, inverse) + held
         rest = ensemble_mean_step(problem.dataset, fitted.blocks)
     moved += rest**2
     moved[primary] += ((np.array(estimated.x) - np.array(coarse.x)) / (SETTINGS.fit.ensemble_mean.finer_parts - 1)) ** 2
