@@ -80,13 +80,7 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
     problem, candidates, groups, phases = inquiry.problem, inquiry.candidates, inquiry.groups, inquiry.phases
     parallel_map = inquiry.executor.parallel_map
     count = sum(b.residual.size for b in base.blocks)
-    clocked = restarted_base if problem.effort.is_ensemble else with_time_shift_search
-    base = clocked(problem, base)  # what a clock leaves is no noise,
-    if with_noise_of_fit(problem, base, phases):
-        base = problem.again(base)
-    base = clocked(problem, base)  # and no effect's gain
-    before = mismatch_of(problem.dataset, base.blocks, phases)
-    base = with_full_weights(problem, base)
+    base, before = _begun(inquiry, base)
     inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
     scored = first_scored = score_candidates(problem, base, candidates, groups, parallel_map=parallel_map)
 
@@ -103,11 +97,7 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
         scored = beside(current, mismatch)
     refuted = paired = False
     for _ in range(SETTINGS.selection.flexibility.most_effects - len(begun)):
-        if is_tolerated(problem, current):
-            break
-        if scored.p_value() > TUNING.admitting_p_value and is_enough(problem, current, mismatch):
-            break
-        if not taken and not problem.effort.is_ensemble and is_explained_by_clocks(problem, base, parallel_map):
+        if _is_explained(inquiry, taken, current, mismatch, scored):
             break
         tried = step(inquiry, current, scored)
         first = first or tried
@@ -127,18 +117,12 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
             current = with_full_weights(problem, current)
             mismatch = mismatch_of(problem.dataset, current.blocks, phases)
         if len(taken) == 2 and not is_enough(problem, current, mismatch):
-            # of two that are strong the first may have been taken for something else
-            other = None
-            if pairs and not problem.effort.is_ensemble:
-                other, paired = best_subsets(inquiry, taken, first_scored, current), True
-            elif problem.effort.is_ensemble and current.chi2 - count < TUNING.hopeless_share * (base.chi2 - count):
-                other = with_first_exchanged(inquiry, taken, current)
+            paired = pairs and not problem.effort.is_ensemble
+            is_near = current.chi2 - count < TUNING.hopeless_share * (base.chi2 - count)
+            other = _other_two(inquiry, taken, current, first_scored if paired else None, is_near=is_near)
             if other is not None:
                 (taken, mismatch), current = other, other[0][-1].fitted
-        is_lost = len(taken) > 1 and (
-            is_hopeless(problem, base, current) or is_third_unlikely(problem, taken[-1], current)
-        )
-        if is_lost or is_over_flexible(current.effects):
+        if _is_lost(problem, base, taken, current):
             break
         scored = beside(current, mismatch)
     if not problem.heavy_tailed:
@@ -156,6 +140,50 @@ def forward_selection(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()
         refuted=refuted,
         paired=paired,
     )
+
+
+def _begun(inquiry: Inquiry, base: Fitted) -> tuple[Fitted, Mismatch]:
+    """The base with its clocks where they fit, its noise and weights, and what it leaves."""
+    problem, phases = inquiry.problem, inquiry.phases
+    clocked = restarted_base if problem.effort.is_ensemble else with_time_shift_search
+    base = clocked(problem, base)  # what a clock leaves is no noise,
+    if with_noise_of_fit(problem, base, phases):
+        base = problem.again(base)
+    base = clocked(problem, base)  # and no effect's gain
+    before = mismatch_of(problem.dataset, base.blocks, phases)
+    return with_full_weights(problem, base), before
+
+
+def _is_explained(
+    inquiry: Inquiry, taken: Sequence[Step], current: Fitted, mismatch: Mismatch, scored: ScoreTest
+) -> bool:
+    """Whether nothing more is asked for: what is left is tolerated, is noise, or is the clocks' alone."""
+    problem = inquiry.problem
+    if is_tolerated(problem, current):
+        return True
+    if scored.p_value() > TUNING.admitting_p_value and is_enough(problem, current, mismatch):
+        return True
+    is_first = not taken and not problem.effort.is_ensemble
+    return is_first and is_explained_by_clocks(problem, current, inquiry.executor.parallel_map)
+
+
+def _other_two(
+    inquiry: Inquiry, taken: Sequence[Step], current: Fitted, at_first: ScoreTest | None, *, is_near: bool
+) -> tuple[list[Step], Mismatch] | None:
+    """Another two effects: the best of all pairs by their scores `at_first`, or, if `is_near`, the first one exchanged.
+
+    Of two that are strong the first may have been taken for something else.
+    """
+    if at_first is not None:
+        return best_subsets(inquiry, taken, at_first, current)
+    return with_first_exchanged(inquiry, taken, current) if inquiry.problem.effort.is_ensemble and is_near else None
+
+
+def _is_lost(problem: Problem, base: Fitted, taken: Sequence[Step], current: Fitted) -> bool:
+    """Whether no further effect would make an explanation of what was taken."""
+    if len(taken) > 1 and (is_hopeless(problem, base, current) or is_third_unlikely(problem, taken[-1], current)):
+        return True
+    return is_over_flexible(current.effects)
 
 
 def is_hopeless(problem: Problem, base: Fitted, current: Fitted) -> bool:
