@@ -15,7 +15,7 @@ from typing import Any
 from rollover.assessment.results import plain
 from rollover.recording import UnreadableError, put_text, read_pairs, read_table, write_pairs, write_table
 from rollover.studies.case import Result, stated_versions
-from rollover.studies.study import Study, meaning_of, unit_of
+from rollover.studies.study import Study, is_measure, meaning_of, unit_of
 from rollover.system.errors import Fault, InputError
 from rollover.system.own_json import read_json
 from rollover.system.processes import Failure
@@ -152,6 +152,8 @@ def stored(folder: Path, key: str) -> Row | None:
         is_own = is_own and all(v is None or isinstance(v, _TYPES.get(name, str)) for name, v in recorded)
         if not is_own or None in (*measures, *measures.values()) or not all(isinstance(text, str) for text in texts):
             return None  # somebody else wrote it
+        if not all(is_measure(name) for name in measures):
+            return None
         return Row(
             key=key,
             status=about["status"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -203,6 +204,16 @@ def unit_of(measure: str) -> str:
     if ending == "impulse":
         return "N s"
     return describe(_described(channel if ending == "raw" else measure)).unit
+
+
+@cache
+def is_measure(name: str) -> bool:
+    """Whether a case is measured by this."""
+    try:
+        unit_of(name)
+    except ValueError:
+        return False
+    return True
 
 
 def axis_unit(scenario: Scenario, axis: AnyAxis) -> str:
