@@ -65,7 +65,7 @@ class Signal:
 
     @property
     def quiet(self) -> tuple[float, tuple[float, ...]]:
-        """Noise and autocorrelation of its quiet stretches; those that are held before these are told."""
+        """Noise and autocorrelation of its quiet stretches; those that are held before these are estimated."""
         return self.at_rest or (self.noise, self.ar)
 
     @property

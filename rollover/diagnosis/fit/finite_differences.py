@@ -134,7 +134,7 @@ def difference_beyond_chance(e: Dataset, d: Array, chance: float) -> Array:
     """d sqrt(1 - chance/|d|^2) of samples after the impact: a difference (n,) of runs without what `chance` adds to it.
 
     Two runs that nobody could tell apart differ by so much; over the small steps of a narrow effect it is most of the
-    square, and counted as slope would tell a parameter better than it can be told. Before the impact none adds any.
+    square, and counted as slope would estimate a parameter better than can be. Before the impact none adds any.
     """
     found, late = d.copy(), ~e.early
     power = float(d[late] @ d[late])

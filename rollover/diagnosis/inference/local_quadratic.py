@@ -51,8 +51,8 @@ def local_quadratic_extents(runs: Runs, slopes: Sequence[Array], due: float) -> 
     """How far (t, down and up) the mean of runs may be what was measured, by (R1) to (R3).
 
     `slopes` (n,) are those at the fit, of each recording by t, of samples that count in full. Nought both where they
-    are surely right, for then they tell more. None where that is not told: no slope stands out within the places that
-    are looked at, more and more until one is told well.
+    are surely right, for then they tell more. None where none is estimated: no slope stands out within the places that
+    are looked at, more and more until one is estimated well.
     """
     met: list[tuple[float, Sequence[ResidualBlock]]] = []
     best = Slope(clear=0.0)

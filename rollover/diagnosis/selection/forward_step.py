@@ -287,7 +287,7 @@ def _other_minimum(fits: Sequence[Fitted]) -> list[Fitted]:
 def largest_change(problem: Problem, base: Fitted, fitted: Fitted) -> float:
     """How far the added effect moves any channel of any recording, largest root mean square over the range.
 
-    Within half a step of a channel's digits nothing is told to have moved.
+    Within half a step of a channel's digits nothing counts as moved.
     """
     return _run_distance(problem, base.blocks, fitted.blocks)
 
