@@ -69,7 +69,7 @@ def fitted(problem: Problem, start: Place, base: Fitted | None) -> Fitted:
     return found
 
 
-@pytest.mark.parametrize("is_lent", [True, False])
+@pytest.mark.parametrize("is_reused", [True, False])
 def test_a_fit_starts_with_reused_columns_and_ends_with_own(is_reused: bool) -> None:
     problem, runs = problem_of(0.5, 0.6, bend=0.5)
     base = base_at(problem, 0.45)
@@ -130,7 +130,7 @@ def test_a_fit_cut_short_ends_with_its_own_jacobian() -> None:
     assert len(beside(runs, (round(x, 9), round(o, 9)))) == 4
 
 
-@pytest.mark.parametrize(("effort", "is_lent"), [(SETTINGS.forward.runs, True), (SETTINGS.forward.drops, False)])
+@pytest.mark.parametrize(("effort", "is_reused"), [(SETTINGS.forward.runs, True), (SETTINGS.forward.drops, False)])
 def test_a_reduced_fit_starts_with_the_others_columns(effort: Any, is_reused: bool) -> None:
     problem, runs = problem_of(0.5, 0.6, effort=effort)
     whole = problem.fit((SLOPE, MASS), (0.5, 0.6))

@@ -83,7 +83,7 @@ def threshold_starts(
 def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
     """The fit begun anew where its last effect acts elsewhere, as strongly as recordings ask for there; never worse.
 
-    A threshold that moves past a sample leaves a misfit of many small valleys: it is tried all along its stretch, and
+    A threshold that moves past a sample leaves a misfit of many small minima: it is tried all along its stretch, and
     finely beside the fit, on few recordings. What rings keeps its frequency meanwhile.
     """
     if fitted.candidates[-1].is_oscillatory:
