@@ -18,8 +18,14 @@ from rollover.diagnosis.probabilities import credible, log_evidence
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.ensemble_validation import restarted_base
 from rollover.diagnosis.selection.explanation import Explanation, kind_of, with_conditions_refitted
-from rollover.diagnosis.selection.forward_step import by_chance, confusion_set, explains_nearly_all, is_kin, step
-from rollover.diagnosis.selection.scan import score_candidates
+from rollover.diagnosis.selection.forward_step import (
+    by_chance,
+    confusion_set,
+    explains_nearly_all,
+    is_same_family,
+    step,
+)
+from rollover.diagnosis.selection.screening import score_candidates
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 from rollover.scenario import Scenario
@@ -138,7 +144,9 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
         if becomes_best or any(rival is f for f in near):
             continue
         gain = start - float(held_out(rival, groups).chi2.sum())
-        is_probable = any(rival is f for f in probable) and (is_kin(rival, best) or gain > TUNING.half_share * most)
+        is_probable = any(rival is f for f in probable) and (
+            is_same_family(rival, best) or gain > TUNING.half_share * most
+        )
         if is_probable or (is_tolerated(problem, rival) and explains_nearly_all(one, rival, groups)):
             near.append(rival)
     return near

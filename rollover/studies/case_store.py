@@ -22,7 +22,7 @@ from rollover.system.processes import Failure
 from rollover.system.writing import PART, hold, own
 
 FORMAT = "rollover-study-account/1"
-ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK = (
+REPORT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK = (
     "study.json",
     "study.yaml",
     "cases",
@@ -33,8 +33,8 @@ ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK = (
     "worst.yaml",
     ".lock",
 )
-FILES = (ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK)
-TOLD = ("finished", "wall_time", "cpu_time", "peak_memory", "host", "process", "integrator")
+FILES = (REPORT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK)
+EFFORT_COLUMNS = ("finished", "wall_time", "cpu_time", "peak_memory", "host", "process", "integrator")
 PROVENANCE_UNITS = {"wall_time": "s", "cpu_time": "s", "peak_memory": "B"}
 _TYPES = dict.fromkeys(("wall_time", "cpu_time", "peak_memory", "process"), (int, float))  # of what is told; else text
 
@@ -112,9 +112,9 @@ def claim(folder: Path, name: str, *, force: bool) -> Path:
     if force or not set(names) - {LOCK, STUDY}:  # nothing yet, or killed before anything was there
         return target
     try:
-        found = read_json(target / ACCOUNT)
+        found = read_json(target / REPORT)
     except (OSError, ValueError):
-        raise _refused(folder, f"holds results without a {ACCOUNT}; another --out, or --force") from None
+        raise _refused(folder, f"holds results without a {REPORT}; another --out, or --force") from None
     if found.get("format") != FORMAT or found.get("name") != name:
         got = found.get("name", found.get("format", ""))
         raise _refused(folder, f"holds another study, got {got!r}; --force replaces it, --out leaves it")
@@ -220,7 +220,7 @@ def compact(folder: Path, study: Study, keys: Sequence[str], columns: Mapping[st
         meanings[axis.name] = {"meaning": f"{axis.apply} at {', '.join(axis.paths)}", "unit": ""}
     about = {"format": "rollover-study-table/1", "title": study.title, "versions": stated_versions()}
     write_table(table, folder / TABLE, meanings, about)
-    recorded = {name: [row.provenance.get(name) for row in rows] for name in TOLD}
+    recorded = {name: [row.provenance.get(name) for row in rows] for name in EFFORT_COLUMNS}
     detail = [row.provenance.get("detail", "") for row in rows]
     provenance = {"point": table["point"], "case": table["case"], **recorded, "detail": detail}
     provenance["versions"] = [stated_versions()] * len(rows)

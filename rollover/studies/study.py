@@ -188,12 +188,12 @@ class Study:
 
 
 def _tried(levels: NDArray[Any]) -> NDArray[Any]:
-    """Levels without those that are there twice; of very many the ends, and as many as `budget.PROBES` between them."""
+    """Levels without those that are there twice; of many the ends, and `budget.LEVELS_TRIED` between them."""
     each = np.array(list(dict.fromkeys(levels.tolist())), dtype=levels.dtype)
-    if len(each) <= budget.PROBES:
+    if len(each) <= budget.LEVELS_TRIED:
         return each
     each = np.sort(each)  # words too: what is wrong with one of them is told at its case
-    return np.asarray(each[np.linspace(0, len(each) - 1, budget.PROBES).astype(int)])
+    return np.asarray(each[np.linspace(0, len(each) - 1, budget.LEVELS_TRIED).astype(int)])
 
 
 def unit_of(measure: str) -> str:

@@ -17,12 +17,12 @@ from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.tasks import serial_map
 from rollover.diagnosis.selection.forward_step import _refitted_where_slopes_mislead
 from tests.diagnosis.drops import FORCE, recorded
-from tests.diagnosis.test_fits import GAIN, candidate, judge_of
+from tests.diagnosis.test_fits import GAIN, candidate, problem_of
 
 
 def test_held_out_data_are_predicted_by_refits_if_nonlinear() -> None:
     """Slopes a hundred times too flat send the fit without a recording far off: by 0.01 J'w/(0.01 |J|)^2."""
-    problem = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
+    problem = problem_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
     fitted = problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
     assert fitted is not None
     groups = [[0], [1], [2]]
@@ -42,9 +42,9 @@ def test_held_out_data_are_predicted_by_refits_if_nonlinear() -> None:
     assert held_out(again, groups).total == pytest.approx(ahead, rel=0.01)
 
 
-def test_the_best_fit_is_cross_validated_by_refits_in_doubt() -> None:
+def test_the_best_fit_is_cross_validated_by_refits_if_unsure() -> None:
     """Of a threshold slopes may foretell less than a fit does, and no less than 1.2 times what it leaves."""
-    problem = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
+    problem = problem_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
     fitted = problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
     assert fitted is not None
     groups, ahead = [[0], [1], [2]], held_out(fitted, [[0], [1], [2]]).chi2.sum()
@@ -59,9 +59,9 @@ def test_the_best_fit_is_cross_validated_by_refits_in_doubt() -> None:
     assert held_out(rival, groups).chi2.sum() < held_out(lead, groups).chi2.sum() < 1.2**2 * lead.chi2
     asked: list[Any] = []
 
-    def parallel_map(problem: Problem, look: Any, things: Sequence[Any]) -> list[Any]:
+    def parallel_map(problem: Problem, scan: Any, things: Sequence[Any]) -> list[Any]:
         asked.append(list(things))
-        return serial_map(problem, pickle.loads(pickle.dumps(look)), things)  # as it is sent to children
+        return serial_map(problem, pickle.loads(pickle.dumps(scan)), things)  # as it is sent to children
 
     inquiry = cast(
         Inquiry, SimpleNamespace(problem=problem, groups=groups, executor=SimpleNamespace(parallel_map=parallel_map))
@@ -76,7 +76,7 @@ def test_the_best_fit_is_cross_validated_by_refits_in_doubt() -> None:
 
 def test_a_rival_is_not_dismissed_by_misleading_slopes() -> None:
     """One that meets all recordings as well as the best is predicted by fits, one that explains nothing is not."""
-    problem = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
+    problem = problem_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
     base, best = problem.fit((), ()), problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
     assert base is not None
     assert best is not None

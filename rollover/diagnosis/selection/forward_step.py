@@ -231,7 +231,7 @@ def _elsewhere_of(base: Fitted) -> list[tuple[float, ...]]:
 
 
 def _robust_short_fits(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[int]) -> list[Fitted]:
-    """Fits to few recordings with other courses forgiven, as they stand in full.
+    """Fits to few recordings with diverged ones weighted down, as they stand in full.
 
     Where runs part ways what is left in full jumps from place to place, and a fit ends at the first dip.
     """
@@ -258,14 +258,14 @@ def _chosen(screened: Sequence[Screened], effort: Effort, scored: ScoreTest) -> 
     by_key = {s.candidate.key: s for s in screened}
     ranked = [by_key[c.key] for c in scored.ranked([s.candidate for s in screened])]
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
-    reading = [s for s in ranked if s.candidate.kind == "sensor"]
+    of_sensors = [s for s in ranked if s.candidate.kind == "sensor"]
     related = of_same_family([s.candidate for s in moving], effort.promising, effort.leaders)
 
     def score(s: Screened) -> float:
         return scored.scores.get(s.candidate.key, 0.0)
 
     able = []
-    for own in (moving, reading):
+    for own in (moving, of_sensors):
         least = TUNING.least_score * max(map(score, own), default=0.0)
         begun_well = [s for s in by_start if s in own]
         able += [
@@ -288,7 +288,7 @@ def _other_minimum(fits: Sequence[Fitted]) -> list[Fitted]:
 def largest_change(problem: Problem, base: Fitted, fitted: Fitted) -> float:
     """How far the added effect moves any channel of any recording, largest root mean square over the range.
 
-    Within half a step of a channel's digits nothing is told to have moved.
+    Within half a step of a channel's digits nothing counts as moved.
     """
     return _run_distance(problem, base.blocks, fitted.blocks)
 
@@ -353,7 +353,7 @@ def confusion_set(step_: Step, groups: Groups, shared: float = 1.0, *, is_refute
         )
         if rival is best:
             continue
-        if is_refuted and is_kin(rival, best) and explains_nearly_all(step_, rival, groups):
+        if is_refuted and is_same_family(rival, best) and explains_nearly_all(step_, rival, groups):
             found.append(rival)
             continue
         if becomes_best or not explains:
@@ -363,7 +363,7 @@ def confusion_set(step_: Step, groups: Groups, shared: float = 1.0, *, is_refute
     return found
 
 
-def is_kin(rival: Fitted, best: Fitted) -> bool:
+def is_same_family(rival: Fitted, best: Fitted) -> bool:
     """Whether two fits' effects are of one family, and the one does not become the other at an end of its range."""
     one, other = rival.candidates[-1], best.candidates[-1]
     return one.family == other.family and not (is_at_bound(rival) and other.id in EFFECTS[one.id].becomes)
