@@ -42,7 +42,7 @@ def file_of(name: str | Path) -> Path:
 
 
 @contextmanager
-def told(path: Path) -> Iterator[None]:
+def faults_of(path: Path) -> Iterator[None]:
     """Within it, a fault of the scenario made of a file is told as one of that file."""
     with named(path):
         try:

@@ -263,9 +263,9 @@ class Equilibrium:
         eps = 1e-7
         slopes = np.empty((len(free), len(free)))
         for column, k in enumerate(free):
-            nudged = u.copy()
-            nudged[k] += eps
-            slopes[:, column] = (self.residual(nudged)[free] - r) / eps
+            stepped = u.copy()
+            stepped[k] += eps
+            slopes[:, column] = (self.residual(stepped)[free] - r) / eps
         return -np.asarray(np.linalg.lstsq(slopes, r, rcond=1e-10)[0])
 
     def _by_springs(self, u: Array, r: Array, free: list[int]) -> Array:

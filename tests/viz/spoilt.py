@@ -51,7 +51,7 @@ def _plan(text: str) -> str:
     advice = Advice(
         effects=(names[0], names[1]), probability=0.6, best=tried, is_enough=False, tried=(tried,), known=text
     )
-    shares = {"tolerance": 0.0, "gain": 0.01, "power": 0.8, "false_alarm": 0.05, "size": 0.01, "told_apart": 0.9}
+    shares = {"tolerance": 0.0, "gain": 0.01, "power": 0.8, "false_alarm": 0.05, "size": 0.01, "distinguishable": 0.9}
     found = Plan(
         conditions=({text: text},),
         noise={"ground/force_normal": 1.0},
