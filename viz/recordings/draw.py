@@ -15,11 +15,11 @@ from rollover.dynamics.result import Event, Run
 from rollover.spec.vehicle import Striker
 from viz.content.entities import BODY, FILTERED, FOLLOWED, LIMIT, SIMULATED, force_path
 from viz.content.verdict import Peak, newtons, raw
-from viz.recordings.edges import EDGE, edges
+from viz.recordings.edges import EDGE, GRID, edges
 from viz.recordings.scene import extent, parts, path_of_centre
 from viz.recordings.solids import Balls, Block, Hull, Part, Rod, Wire, body_path
 from viz.recordings.stream import Stream, colour, stamps
-from viz.recordings.terrain import GRID, Terrain, corner, cut_open, frames, nice, terrain, thinned
+from viz.recordings.terrain import Terrain, corner, cut_open, frames, nice, terrain, thinned
 
 WARNINGS = ("axle-stop", "plastic-hinge")
 _TOUCHED = "world/ground/touched"
@@ -73,19 +73,20 @@ def picture(run: Run) -> Picture:
     # the load that is asked for sets the scale, unless others would reach out of the picture
     rops = max(highest.get("rops", 0.0), highest.get("rops_upper", 0.0))
     per_metre = max(rops, 0.7 * max(highest.values(), default=0.0)) / longest
+    ground = terrain(
+        run.scenario.ground.surface,
+        elements,
+        touched,
+        outer=outer,
+        grid_step=nice(radius / 8.0),
+        thickness=max(1.2 * deepest, 0.05 * radius),
+    )
     return Picture(
-        ground=terrain(
-            run.scenario.ground.surface,
-            elements,
-            touched,
-            outer=outer,
-            grid_step=nice(radius / 8.0),
-            thickness=max(1.2 * deepest, 0.05 * radius),
-        ),
+        ground=ground,
         soil=soil,
         force=nice(per_metre) if per_metre > 0.0 else 1e3,
         size=float(np.clip(radius, 0.3, 3.0)),
-        edges=edges(run.scenario.ground.surface, outer),
+        edges=edges(run.scenario.ground.surface, ground.outer, elements.spacing),
     )
 
 

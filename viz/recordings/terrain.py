@@ -17,17 +17,15 @@ from numpy.typing import NDArray
 from ground.array import Elements
 from ground.surface import Surface, height, is_flat, normal, normals
 from rollover.dynamics.result import GroundTrack
+from viz.recordings.edges import Rectangle, broken, grid
 
 SOIL = 0x6B5638FF
 BEYOND = 0x5B4C37FF  # undisturbed soil outside the array
 SIDE = 0x3F3120FF
-GRID = 0x463824FF
-_MOST_VERTICES = 20_000  # of the part that never changes
+_MOST_VERTICES = 20_000  # of the part that never changes, and twice as many where it breaks
 _MOST_ROWS = 8_000_000  # vertices times frames of the part that does
 _LEAST_INTERVAL = 0.02  # s, 50 Hz
 _TILE = 12  # elements along the edge of a patch
-
-Rectangle = tuple[float, float, float, float]  # smallest and largest x, smallest and largest y, m
 
 # sinkage over the scale -> red, green, blue; begins with the colour of the undisturbed soil
 _RAMP_AT = np.array([0.0, 0.02, 0.35, 0.7, 1.0])
@@ -72,7 +70,7 @@ class Terrain:
     """Mesh of the ground; world axes, m.
 
     `fixed` (a, 3) with `fixed_triangles` and `fixed_colours` never changes; `patches` do, each at its own times.
-    `grid` holds the ends of lines on the undisturbed surface, (l, 2, 3), `grid_step` m apart.
+    `grid` holds the ends of lines on the undisturbed surface, (l, 2, 3), `grid_step` m apart; `outer` is the whole.
     """
 
     fixed: NDArray[np.float64]
@@ -81,6 +79,7 @@ class Terrain:
     patches: tuple[Patch, ...]
     grid: NDArray[np.float64]
     grid_step: float
+    outer: Rectangle
 
 
 def nice(value: float) -> float:
@@ -189,8 +188,9 @@ def terrain(
         ),
         fixed_colours=np.repeat(np.array([SOIL, BEYOND, SIDE], dtype=np.uint32), [len(p) for p in parts]),
         patches=_patches(elements, whole),
-        grid=_grid(surface, outer, grid_step),
+        grid=grid(surface, outer, grid_step, _nodes(elements)),
         grid_step=grid_step,
+        outer=outer,
     )
 
 
@@ -226,6 +226,11 @@ def _patches(elements: Elements, whole: Patch) -> tuple[Patch, ...]:
             )
         )
     return tuple(found)
+
+
+def _nodes(elements: Elements) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    (nx, ny), (dx, dy), (x0, y0) = elements.count, elements.spacing, corner(elements)
+    return x0 + np.arange(nx + 1) * np.float64(dx), y0 + np.arange(ny + 1) * np.float64(dy)
 
 
 def _bounds(elements: Elements) -> Rectangle:
@@ -354,13 +359,15 @@ def _fixed(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Vertices, triangles and edges on the rim of what never moves.
 
-    Blocks of `block` x `block` elements where nothing moves, and single elements in blocks where some do.
+    Blocks of `block` x `block` elements, and single elements in blocks where some move or the surface breaks.
     """
     nx, ny = elements.count
     bx, by = math.ceil(nx / block), math.ceil(ny / block)
     is_open = np.zeros((bx, by), dtype=bool)
     is_open[moving // ny // block, moving % ny // block] = True
     node_x, node_y = np.minimum(np.arange(bx + 1) * block, nx), np.minimum(np.arange(by + 1) * block, ny)
+    if block > 1 and not is_flat(surface):
+        is_open |= broken(surface, _nodes(elements), (node_x, node_y), 2 * _MOST_VERTICES // (4 * block**2))
     nodes = _place(surface, elements, *np.meshgrid(node_x, node_y, indexing="ij")).reshape(-1, 3)
     i, j = np.nonzero(~is_open)
     first = i * (by + 1) + j
@@ -376,18 +383,3 @@ def _fixed(
     fine = _corners(surface, elements, still // ny, still % ny)
     rim = np.concatenate([rim, len(nodes) + _rim_of(still // ny, still % ny, nx, ny)])
     return np.concatenate([nodes, fine]), np.concatenate([coarse, len(nodes) + _squares(still.size)]), rim
-
-
-def _grid(surface: Surface, outer: Rectangle, step: float) -> NDArray[np.float64]:
-    """Lines at whole multiples of `step`, lifted a little so that they do not flicker within the surface."""
-    x0, x1, y0, y1 = outer
-    lift = 0.004 * step * (normal(surface) if is_flat(surface) else np.array([0.0, 0.0, 1.0]))
-    lines = []
-    pieces = 1 if is_flat(surface) else 100
-    for low, high, across, axis in ((x0, x1, (y0, y1), 0), (y0, y1, (x0, x1), 1)):
-        for at in np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1) * step:
-            along = np.linspace(*across, pieces + 1)
-            way = np.array([(at, c) if axis == 0 else (c, at) for c in along])
-            drawn = np.column_stack([way, height(surface, way[:, 0], way[:, 1])]) + lift
-            lines += [drawn[k : k + 2] for k in range(pieces)]
-    return np.array(lines).reshape(-1, 2, 3)
