@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from rollover.spec.channels import CHANNELS
-from viz.content.entities import WHEEL, escaped, force_path, series
+from viz.content.entities import SIMULATED, WHEEL, escaped, force_colour, force_path, series
 
 NAMES = [
     name.replace("NAME", who)
@@ -17,6 +17,12 @@ NAMES = [
     for who in (("left", "right", "front_left") if "NAME" in name else ("",))
     if name != "time"
 ]
+
+
+@pytest.mark.parametrize("body", ["chassis", "trailer", "front_axle", "hub_rear_left", "bogie_left", "occupant_head"])
+def test_only_the_arrow_at_the_rops_has_its_colour(body: str) -> None:
+    assert force_colour("rops") == force_colour("rops_upper") == SIMULATED
+    assert force_colour(body) != SIMULATED
 
 
 def test_every_known_channel_has_a_place_of_its_own() -> None:

@@ -11,7 +11,7 @@ import pytest
 from rollover.dynamics.result import Run
 from rollover.scenario import load
 from rollover.spec.inertia import MassProperties
-from rollover.spec.initiation import Throw, TipOver
+from rollover.spec.initiation import Driving, Throw, TipOver
 from rollover.spec.shapes import Disc, Point, Points
 from rollover.spec.vehicle import Attached, RigidBody, Striker, Vehicle
 from tests.viz import example
@@ -134,6 +134,32 @@ def test_the_eye_is_where_the_vehicle_falls_to(overturn: Run, side: str, sign: f
     assert towards[0] * sign < 0.0
     assert towards[1] < 0.0
     assert towards[2] > 0.0
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 110.0])
+def test_the_eye_is_before_a_rops_that_lands_after_a_turn(overturn: Run, turn_deg: float) -> None:
+    blueprint = pytest.importorskip(
+        "viz.recordings.blueprint", reason="no rerun wheel for this platform", exc_type=ImportError
+    )
+    half = math.radians(0.5 * turn_deg)
+    chassis = overturn.motion["chassis"]
+    x, y, z, w = chassis.quaternion.T
+    c, s = math.cos(half), math.sin(half)
+    about_z = np.stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z], axis=1)
+    vehicle = overturn.scenario.vehicle
+    assert isinstance(vehicle, Vehicle)
+    vehicle = dataclasses.replace(
+        vehicle, wheels=tuple(dataclasses.replace(wheel, inertia=1.0) for wheel in vehicle.wheels)
+    )
+    run = dataclasses.replace(
+        overturn,
+        scenario=dataclasses.replace(overturn.scenario, vehicle=vehicle, initiation=Driving(speed=7.0)),
+        motion={**overturn.motion, "chassis": dataclasses.replace(chassis, quaternion=about_z)},
+    )
+    first = int(np.flatnonzero(np.any(overturn.contact["rops"].force, axis=1))[0])
+    roof = rotation(about_z[first])[:2, 2]  # from the wheels to the frame
+    towards = blueprint._seen_from(run)[:2]
+    assert towards @ roof > 0.8 * np.linalg.norm(towards) * np.linalg.norm(roof)
 
 
 def test_arrows_stay_in_the_picture(overturn: Run) -> None:

@@ -132,6 +132,11 @@ def force_path(scale: float, body: str) -> str:
     return f"world/{escaped(f'forces_1m_is_{1e-3 * scale:g}kN')}/{escaped(body)}"
 
 
+def force_colour(body: str) -> int:
+    """Colour of a body's ground force arrow; only the ROPS's is as blue as its curve, or others were taken for it."""
+    return BODY.get(body, BODY["chassis"])
+
+
 def shown(unit: str) -> tuple[str, float]:
     """Unit for people and its factor, for an SI unit: ``"N" -> ("kN", 1e-3)``."""
     return _SHOWN.get(unit, (unit, 1.0))

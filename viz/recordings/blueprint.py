@@ -16,7 +16,7 @@ from rollover.dynamics.result import Run
 from rollover.scenario import Scenario
 from rollover.spec.vehicle import Striker
 from viz.content.entities import FOLLOWED, TIMELINE, series
-from viz.recordings.scene import extent, path_of_centre
+from viz.recordings.scene import extent, path_of_centre, rotation
 
 BACKGROUND = 0x2B313CFF
 _FIELD_OF_VIEW = math.radians(55.0)  # the viewer's own, vertical
@@ -180,9 +180,25 @@ def _seen_from(run: Run) -> NDArray[np.float64]:
     """
     if isinstance(run.scenario.vehicle, Striker):
         return np.array([0.3, -0.9, 0.38])
-    heading = math.radians(_heading(run.scenario))
+    heading, side = _landing(run) or (math.radians(_heading(run.scenario)), _side(run))
     c, s = math.cos(heading), math.sin(heading)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ [-0.45, 0.8 * _side(run), 0.52]
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ [-0.45, 0.8 * side, 0.52]
+
+
+def _landing(run: Run) -> tuple[float, float] | None:
+    """Heading, rad, and side, +1 left, with which a driven vehicle's ROPS lands; None if it lands on neither side.
+
+    It may have turned on its way: from where it headed at first, a frame that lands after a turn is out of sight.
+    """
+    forces = [run.contact[name].force for name in ("rops", "rops_upper") if name in run.contact]
+    loaded = np.flatnonzero(np.any(forces, axis=(0, 2))) if forces else np.zeros(0)
+    if run.scenario.initiation.kind != "driving" or not loaded.size:
+        return None
+    R = rotation(run.motion["chassis"].quaternion[loaded[0]])
+    ahead, across = R[:2, 0], R[0, 0] * R[1, 2] - R[1, 0] * R[0, 2]
+    if min(float(np.linalg.norm(ahead)), abs(across)) < 0.5:  # pitched over, or on its head
+        return None
+    return math.atan2(ahead[1], ahead[0]), math.copysign(1.0, across)
 
 
 def _heading(scenario: Scenario) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rollover.dynamics.result import Event, Run
 from rollover.spec.vehicle import Striker
-from viz.content.entities import BODY, FILTERED, FOLLOWED, LIMIT, SIMULATED, force_path
+from viz.content.entities import FILTERED, FOLLOWED, LIMIT, force_colour, force_path
 from viz.content.verdict import Peak, newtons, raw
 from viz.recordings.edges import EDGE, GRID, edges
 from viz.recordings.scene import extent, parts, path_of_centre
@@ -51,7 +51,7 @@ class Picture:
         )
 
 
-LABELLED = ("rops", "rops_upper", "chassis", "striker", "device", "weight")
+LABELLED = ("rops", "rops_upper", "chassis", "trailer", "striker", "device", "weight")
 
 
 def picture(run: Run) -> Picture:
@@ -112,7 +112,7 @@ def standing(out: Stream, run: Run, with_: Picture) -> None:
     for part in parts(run):
         out.static(part.path, _drawn(part))
     for body in run.contact:
-        look = rr.Arrows3D.from_fields(colors=colour(BODY.get(body, SIMULATED)), radii=[0.02 * with_.size])
+        look = rr.Arrows3D.from_fields(colors=colour(force_colour(body)), radii=[0.02 * with_.size])
         out.static(force_path(with_.force, body), look)
 
 
