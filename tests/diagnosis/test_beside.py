@@ -17,7 +17,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.result import Share
 from rollover.diagnosis.selection.explanation import Explanation
-from rollover.diagnosis.selection.forward_step import by_chance
+from rollover.diagnosis.selection.forward_step import by_chance, confusion_set
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.statements import usual_model_error_sentence
 from rollover.effects import EFFECTS, Search
@@ -82,7 +82,8 @@ SOME = (0.8, 0.9, 1.0, 0.9, 1.0, 0.8)  # of which a discrepancy of unit size lea
         (SOME, (0.3, 0.8, 1.1, 0.9, 0.6, 0.8), 1e-9, "no-mismatch"),  # some, maybe none: what drops have in common
         (SOME, (0.01, 1.2, 0.01, 1.3, 0.01, 0.01), 1e-9, "no-mismatch"),  # half, of some drops alone: maybe none
         (SOME, (0.05, 0.9, 0.1, 1.0, 0.1, 0.05), 1e-9, "missing-physics"),  # three fifths, and surely some of it
-        (SOME, (0.2, 0.2, 0.3, 0.2, 0.3, 0.2), 0.2, "no-mismatch"),  # the best of all does as much by chance
+        (SOME, (0.05, 0.9, 0.1, 1.0, 0.1, 0.05), 0.2, "no-mismatch"),  # the best of all does as much by chance
+        (SOME, (0.2, 0.2, 0.3, 0.2, 0.3, 0.2), 0.2, "missing-physics"),  # surely half: no chance does that drop by drop
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (0.5,) * 6, 1e-9, "missing-physics"),
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (5.0,) * 6, 1e-9, "unexplained"),
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (3.0,) * DROPS, 1e-9, "missing-physics"),  # leaves more, and is surely half
@@ -176,12 +177,22 @@ def test_rivals_of_a_family_or_within_the_discrepancy_stay(monkeypatch: pytest.M
         less = explanation((100.0,) * DROPS, best, *half).parts[0]  # its kin are offered all the same
         assert [f.candidates[-1].id for f in alike_beside(PROBLEM, less, GROUPS)] == ["soil-layer", "soil-crust"]
     # one that becomes the best at the end of its range is the best itself
-    at_an_end = fitted("soil-crust", (0.6,) * DROPS, numbers=2, x=1.0)
-    step = explanation((100.0,) * DROPS, fitted("soil-layer", (0.5,) * DROPS), at_an_end).parts[0]
-    assert [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)] == ["soil-layer"]
+    ends = [fitted(id, (0.6,) * DROPS, numbers=2, x=1.0) for id in ("soil-crust", "soil-rate-hardening")]
+    step = explanation((100.0,) * DROPS, fitted("soil-stiffness", (0.5,) * DROPS), *ends).parts[0]
+    offered = [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)]
+    assert offered == ["soil-stiffness", "soil-rate-hardening"]  # whose slowest speed is no stiffness
     # where there is little to explain, one that explains less of it is excluded though it leaves little
     step = explanation(SOME, fitted("soil-layer", (0.2,) * DROPS), fitted("guide-friction", (0.7,) * DROPS)).parts[0]
     assert [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)] == ["soil-layer"]
+
+
+def test_rivals_of_a_family_whose_form_is_refuted() -> None:
+    """Who leaves a seventh of what another does is the likelier one, unless neither form is the right one."""
+    best, other = fitted("soil-viscous-damping", (3.0,) * DROPS), fitted("soil-inertial-drag", (20.0,) * DROPS)
+    others = [fitted("soil-stiffness", (20.0,) * DROPS), fitted("soil-rate-hardening", (200.0,) * DROPS)]
+    one = explanation((3000.0,) * DROPS, best, other, *others).parts[0]
+    assert confusion_set(one, GROUPS) == [best]
+    assert confusion_set(one, GROUPS, is_refuted=True) == [best, other]
 
 
 def test_many_scales_are_stated_by_the_least_and_the_most() -> None:

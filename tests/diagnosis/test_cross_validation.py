@@ -13,7 +13,7 @@ import pytest
 
 from rollover.diagnosis.fit.cross_validation import cross_validated_by_refits, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.step import Inquiry
+from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.tasks import serial_map
 from rollover.diagnosis.selection.forward_step import _refitted_where_slopes_mislead
 from tests.diagnosis.drops import FORCE, recorded
@@ -72,3 +72,24 @@ def test_the_best_fit_is_cross_validated_by_refits_if_unsure() -> None:
     assert held_out(new, groups).chi2.sum() == pytest.approx(ahead, rel=0.01)
     assert asked == [groups]
     assert _refitted_where_slopes_mislead(inquiry, [fitted, rival])[0] is fitted  # it foretells best as it is
+
+
+def test_a_rival_is_not_dismissed_by_misleading_slopes() -> None:
+    """One that meets all recordings as well as the best is predicted by fits, one that explains nothing is not."""
+    problem = problem_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
+    base, best = problem.fit((), ()), problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
+    assert base is not None
+    assert best is not None
+    groups = [[0], [1], [2]]
+    pulled = [b.residual + 3.0 * b.J[:, 0] / np.linalg.norm(b.J) for b in best.blocks[1:]]
+    misled = [replace(b, J=0.01 * b.J, residual=w) for b, w in zip(best.blocks[1:], pulled, strict=True)]
+    flat = replace(best, blocks=(best.blocks[0], *misled))
+    idle = replace(
+        flat, blocks=tuple(replace(b, residual=o.residual) for b, o in zip(flat.blocks, base.blocks, strict=True))
+    )
+    assert held_out(flat, groups).total > 1.2 * float(np.sqrt(flat.chi2 / sum(b.size for b in flat.blocks)))
+    step = Step(base=base, fitted=best, p_value=0.0, rivals=(best, flat, idle)).cross_validated(problem, groups)
+    ahead, rival, other = step.rivals
+    assert ahead is step.fitted is best
+    assert held_out(rival, groups).total == pytest.approx(held_out(best, groups).total, rel=0.01)
+    assert other is idle

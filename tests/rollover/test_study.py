@@ -6,7 +6,6 @@ import errno
 import json
 import math
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from rollover.assessment.loads import peak_loads
 from rollover.cli.main import app
 from rollover.dynamics import simulate
 from rollover.dynamics.drop_test import DropModel
-from rollover.recording import read_pairs, read_table, write_pairs
+from rollover.recording import read_table
 from rollover.scenario import load
 from rollover.spec import document
 from rollover.studies import case_store
@@ -256,33 +255,6 @@ def test_a_changed_study_runs_only_what_is_new(tmp_path: Path) -> None:
     told, _ = read_table(tmp_path / "out" / case_store.PROVENANCE)
     assert told["case"] == table["case"]
     assert all("exudyn" in v for v in told["versions"])
-
-
-def cut(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[:100])
-
-
-def turned(path: Path) -> None:
-    """One bit of a stored number."""
-    measures, _ = read_pairs(path)
-    whole = bytearray(path.read_bytes())
-    whole[whole.index(np.float64(measures["ground/sinkage"]).tobytes())] ^= 2
-    path.write_bytes(whole)
-
-
-def foreign(path: Path) -> None:
-    measures, about = read_pairs(path)
-    write_pairs({f"grotnd/{name}": value for name, value in measures.items()}, about, path)
-
-
-@pytest.mark.parametrize("damage", [cut, turned, foreign])
-def test_a_damaged_file_is_run_again(damage: Callable[[Path], None], tmp_path: Path) -> None:
-    _, done = conducted(tmp_path)
-    path = case_store.path_of(tmp_path / "out", done.keys[4])
-    damage(path)
-    before = (tmp_path / "out" / case_store.TABLE).read_bytes()
-    assert conducted(tmp_path)[1].ran == 1
-    assert (tmp_path / "out" / case_store.TABLE).read_bytes() == before
 
 
 def test_an_invalid_point_is_a_row_and_failures_are_retried(tmp_path: Path) -> None:
