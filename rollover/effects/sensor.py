@@ -51,7 +51,7 @@ def is_length(channel: str) -> bool:
 
 
 def _with(recording: Recording, channel: str, values: Array) -> Recording:
-    return replace(recording, channels={**recording.channels, channel: values})
+    return recording.showing({**recording.channels, channel: values})
 
 
 @compiled
