@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, largest_jump_nearby
+from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, largest_jumps_nearby
 from rollover.diagnosis.forward.filtering import Rows, filtered_like, rows_of
 from rollover.diagnosis.forward.full_run import SENSORS, RunSimulator
 from rollover.diagnosis.forward.instruments import Instruments
@@ -40,7 +40,6 @@ class Exchanged:
 
 
 NOTHING = Exchanged({})
-NO_EDGES: tuple[dict[str, Any], ...] = tuple({} for _ in EDGES)
 
 
 class DropSimulator:
@@ -111,9 +110,7 @@ class DropSimulator:
             self._keep(self._read_by, reads.key, found, TUNING.cached_predictions)
         return self._read_by[reads.key]
 
-    def _misread(
-        self, physical: Exchanged, shift: float, sensors: Mapping[str, Any], drop: Array
-    ) -> dict[str, Array]:
+    def _misread(self, physical: Exchanged, shift: float, sensors: Mapping[str, Any], drop: Array) -> dict[str, Array]:
         """Channels at the stamps as `sensors` read a drop."""
         channels = {**channels_of(drop, self.instruments.names), **self._edges(physical, shift, sensors)}
         run = self._unread.showing(channels)
@@ -126,20 +123,23 @@ class DropSimulator:
         instants, rows = self._track(physical, float(time[-1] - shift) if time.size else 0.0).jumps
         if not instants.size:
             return {}
-        lags, *clocks = ({e.channel: e for e in every(sensors, name)} for name in EDGES) if sensors else NO_EDGES
-        sizes = np.ascontiguousarray(rows.T)
-        jumping = [name for name in self._sharp if name not in lags and sizes[COLUMNS[name][0]].any()]
-        return {
-            DISCONTINUITY_IN + name: largest_jump_nearby(
-                _own(time, name, *clocks) - shift, instants, sizes[COLUMNS[name][0]]
-            )
-            for name in jumping
-        }
+        lags, *clocks = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
+        jumping = set(np.flatnonzero(rows.any(axis=0)).tolist())
+        sharp = [name for name in self._sharp if name not in lags and COLUMNS[name][0] in jumping]
+        timed = {*clocks[0], *clocks[1]}
+        groups = [(time, [name for name in sharp if name not in timed])]
+        groups += [(_own(time, name, *clocks), [name]) for name in sharp if name in timed]
+        found: dict[str, Array] = {}
+        for own, names in groups:
+            columns = np.array([COLUMNS[name][0] for name in names], dtype=np.int64)
+            sizes = largest_jumps_nearby(own - shift, instants, rows, columns)
+            found |= {DISCONTINUITY_IN + name: size for name, size in zip(names, sizes, strict=True)}
+        return found
 
     def _edges(self, physical: Exchanged, shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a jump lies between the rows."""
         lags, offsets, drifts = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
-        found = {}
+        found: dict[str, Array] = {}
         for channel in {*lags, *offsets, *drifts} & set(self.instruments.names):
             own = _own(self.rows.times, channel, offsets, drifts)
             key = channel, offsets.get(channel), drifts.get(channel)
