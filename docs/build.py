@@ -36,6 +36,7 @@ SITE = {  # caption -> pages, in the order of the menu
         "docs/inputs",
         "docs/occupant",
         "docs/articulated",
+        "docs/machines",
         "docs/viewing",
         "docs/commands",
         "docs/python",

@@ -60,7 +60,7 @@ def judged(requirement: Requirement, simulated: float, note: str, *, otherwise: 
     return replace(row, verdict="met" if otherwise and margin >= -ROUNDING else "not met")
 
 
-def told(requirement: Requirement, simulated: float, given: float, note: str) -> Criterion:
+def prescribed(requirement: Requirement, simulated: float, given: float, note: str) -> Criterion:
     """A requirement beside what a test that broke nothing reached: it was told to go as far as `given`, no further."""
     row = judged(requirement, simulated, note)
     if row.verdict == "met":

@@ -25,7 +25,7 @@ FORMAT = "rollover-rops/1"
 SHELF = "vehicles/rops"
 METHOD = (
     "Euler beams with fibre sections, elastic and then plastic with straight kinematic hardening; each load leans with "
-    "the frame. Joints are rigid and as strong as what they join; shear deflection, local buckling, tearing{more} are "
+    "the frame. Joints are rigid{joints}; shear deflection, local buckling, tearing{more} are "
     "left out."
 )
 
@@ -42,7 +42,7 @@ def file_of(name: str | Path) -> Path:
 
 
 @contextmanager
-def told(path: Path) -> Iterator[None]:
+def faults_of(path: Path) -> Iterator[None]:
     """Within it, a fault of the scenario made of a file is told as one of that file."""
     with named(path):
         try:
@@ -100,8 +100,9 @@ def json_of(found: FrameTest, about: Mapping[str, Any] | None = None) -> dict[st
         **({"speed": found.speed} if found.speed else {}),
         "elements": len(found.frame.mesh.ends),
         "versions": versions(),
-        "method": _method(found.speed),
+        "method": _method(found.speed, found.rops),
         "members": [_member(b) for b in found.rops.beams],
+        **({"connections": connections(found.rops)} if found.rops.connections else {}),
         "tests": list(found.tests),
         "criteria": [asdict(row) for row in found.criteria],
         "verdict": _verdict(found),
@@ -109,11 +110,14 @@ def json_of(found: FrameTest, about: Mapping[str, Any] | None = None) -> dict[st
     }
 
 
-def _method(speed: float) -> str:
+def _method(speed: float, rops: Rops) -> str:
+    joints = ", and give way as their welds, bolts and cast pieces do, where these are given"
+    joints = joints if rops.connections else " and as strong as what they join"
     if speed == 0.0:
-        return METHOD.format(more=" and the rate of strain")
+        return METHOD.format(joints=joints, more=" and the rate of strain")
     said = f" Loads go at {speed:g} m/s, and what has a rate factor yields higher by it (Cowper and Symonds)."
-    return METHOD.format(more="").replace("local buckling, tearing", "local buckling and tearing") + said
+    text = METHOD.format(joints=joints, more="").replace("local buckling, tearing", "local buckling and tearing")
+    return text + said
 
 
 def _member(b: Any) -> dict[str, Any]:
@@ -132,6 +136,25 @@ def _member(b: Any) -> dict[str, Any]:
         "plastic_torque": torque,
         **asdict(b.section.properties),
     }
+
+
+def connections(rops: Rops) -> list[dict[str, Any]]:
+    """What each connection carries, each force alone, and of its member's plastic resistances."""
+    beams, rows = {b.name: b for b in rops.beams}, []
+    for c in rops.connections:
+        beam = beams[c.member]
+        alone, plastic = c.resistances(beam), beam.plastic_resistance
+        rows.append(
+            {
+                "name": c.name,
+                "kind": c.kind,
+                "member": c.member,
+                "end": c.end,
+                **dict(zip(("force", "moment_depth", "moment_width"), alone, strict=True)),
+                "of_member": min(own / of for own, of in zip(alone, plastic[:3], strict=True)),
+            }
+        )
+    return rows
 
 
 def _verdict(found: FrameTest) -> str:
@@ -156,6 +179,12 @@ def warnings(found: FrameTest) -> list[str]:
             said.append(
                 f"Load {e['name']!r} strains {e['strained']} by {100.0 * e['strain']:.0f} %, beyond the uniform strain "
                 "of its steel: it may tear."
+            )
+    for c in connections(found.rops):
+        if c["of_member"] < 1.0:
+            said.append(
+                f"{c['name']}, {c['kind']}, carries {100.0 * c['of_member']:.0f} % of what {c['member']} does: it "
+                "gives way before the tube, without a plastic hinge."
             )
     others = [m.name for m in found.rops.members if m.name not in {b.name for b in found.rops.beams}]
     if others:

@@ -12,6 +12,7 @@ import numpy as np
 from rollover.assessment.clearance import signed_distance
 from rollover.assessment.criterion import Criterion, judged
 from rollover.assessment.virtual_tests import concluded, overload, pairs
+from rollover.dynamics.frame.connected import connected
 from rollover.dynamics.frame.equilibrium import Frame, Support
 from rollover.dynamics.frame.mesh import mesh
 from rollover.dynamics.frame.push import Point, State, at_rest, let_go, push
@@ -90,7 +91,10 @@ def frame_test(
     rows: list[Criterion] = []
     for load, requirement in pairs(loads, asked):
         entry = tests[[e["name"] for e in tests].index(load.name)]
-        rows.append(_judged(load, entry, requirement))
+        broken = [
+            f"{e['broken']} gave way in load {e['name']!r}" for e in tests[: tests.index(entry)] if e.get("broken")
+        ]
+        rows.append(_judged(load, entry, requirement, broken[0] if broken else ""))
         if entry["overload"] and requirement.source == STATIC:
             rows.append(overload(load, entry, requirement))
     return FrameTest(
@@ -243,6 +247,7 @@ def _loaded(
         **({"energy_at": goal.there.deflection} if goal.there is not None else {}),
         **yielding(frame, points),
         **_intrusion(frame, points, rops),
+        **connected(frame, rops.connections, points),
     }
     try:
         # back at the same speed, as far as a spring of the first stiffness would go
@@ -275,7 +280,8 @@ def _intrusion(frame: Frame, points: Sequence[Point], rops: Rops) -> dict[str, A
     return {"zone_distance": min(away), "entered": entered}
 
 
-def _judged(load: Push, entry: Mapping[str, Any], requirement: Any) -> Criterion:
+def _judged(load: Push, entry: Mapping[str, Any], requirement: Any, before: str) -> Criterion:
+    """The verdict on a load; `before` says which connection gave way before it, if one did."""
     simulated = float(entry.get(requirement.quantity, 0.0))
     note = f"load {load.name!r} {entry['status']}"
     if "deflection" in entry:
@@ -284,6 +290,12 @@ def _judged(load: Push, entry: Mapping[str, Any], requirement: Any) -> Criterion
     if (entered := entry.get("entered")) is not None:
         note += f"; a member entered the clearance zone at {1e3 * entered['deflection']:.0f} mm"
         return judged(requirement, min(simulated, entered[requirement.quantity]), note)
+    if before:
+        return judged(requirement, 0.0, f"{note}; {before}")
+    if entry.get("broken") is not None:
+        at = next(row["failed"] for row in entry["connections"] if row["name"] == entry["broken"])
+        note += f"; {entry['broken']} gives way at {1e3 * at['deflection']:.0f} mm and {1e-3 * at['force']:.1f} kN"
+        return judged(requirement, min(simulated, at[requirement.quantity]), note)
     row = concluded(load, entry, requirement, simulated, note)
     if entry.get("strain_over_uniform", 0.0) > 1.0:
         more = f"{row.note}; {entry['strained']} is strained beyond the tensile test's uniform strain: it may tear"

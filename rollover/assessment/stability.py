@@ -43,7 +43,7 @@ UNLOADED = 0.002  # share of its load on level ground with which a wheel carries
 SLIPS = 0.02
 REST = 1e-5  # residual forces and moments over the weight
 NEAR, LEAST, SADDLE = 0.1, 1e-6, 1e-5  # m or rad at a time; damping, and instability, over the contacts' stiffness
-NUDGE = 1e-4
+PERTURBATION = 1e-4
 PATIENCE = 400
 
 
@@ -184,7 +184,7 @@ class _Tilt:
         that make it 1, 1/tau is a damping over the contacts' stiffness. It stays above what instability there is, so
         that the way goes down, never to a saddle.
         """
-        u, damping, nudge = start.copy(), LEAST, NUDGE
+        u, damping, perturbation = start.copy(), LEAST, PERTURBATION
         r = self._residual(u)
         for _ in range(PATIENCE):
             K = self._stiffness(u, r)
@@ -192,8 +192,8 @@ class _Tilt:
             if float(np.max(np.abs(self.lower @ r))) < REST:
                 if least > -SADDLE:
                     return self._stance(slope, u, gone=False)
-                nudge *= 4.0  # a saddle
-                u[self.free] += nudge * np.linalg.solve(self.lower.T, way)
+                perturbation *= 4.0  # a saddle
+                u[self.free] += perturbation * np.linalg.solve(self.lower.T, way)
                 r = self._residual(u)
                 continue
             while damping < 1e12:
@@ -245,9 +245,9 @@ class _Tilt:
         """-dr/du by differences."""
         eps, K = 1e-7, np.empty((len(r), len(r)))
         for column, k in enumerate(self.free):
-            nudged = u.copy()
-            nudged[k] += eps
-            K[:, column] = (r - self._residual(nudged)) / eps
+            stepped = u.copy()
+            stepped[k] += eps
+            K[:, column] = (r - self._residual(stepped)) / eps
         return np.asarray(np.linalg.solve(self.lower, K.T).T)
 
     @staticmethod

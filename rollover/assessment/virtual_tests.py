@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from rollover.assessment.clearance import Approach
-from rollover.assessment.criterion import ROUNDING, Criterion, compared, judged, told
+from rollover.assessment.criterion import ROUNDING, Criterion, compared, judged, prescribed
 from rollover.dynamics.result import Run
 from rollover.dynamics.stands.static_load import OVERLOAD_DROP
 from rollover.spec.stand import PendulumBlow, StaticTest, TiltTable
@@ -86,7 +86,7 @@ def _load(
 def concluded(load: Push, entry: Mapping[str, Any], requirement: Requirement, simulated: float, note: str) -> Criterion:
     """What a load that kept out of the clearance zone shows of its requirement, by how it ended."""
     if entry["status"] == "reached":
-        return told(requirement, simulated, float(load.energy or load.force or 0.0), note)
+        return prescribed(requirement, simulated, float(load.energy or load.force or 0.0), note)
     if load.until_failure and simulated >= requirement.value * (1.0 - ROUNDING):
         row = judged(requirement, simulated, note)
         return row if "reached_at" in entry else replace(row, margin=None)

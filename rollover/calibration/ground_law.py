@@ -36,7 +36,7 @@ class Found:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settled:
+class Usable:
     """Recordings on the scenario's time, the zeros that were found for it, and a sentence for each left out."""
 
     recordings: Mapping[str, Recording]
@@ -44,7 +44,7 @@ class Settled:
     refused: tuple[str, ...]
 
 
-def settled(recordings: Mapping[str, Recording], scenario: Scenario) -> Settled:
+def usable(recordings: Mapping[str, Recording], scenario: Scenario) -> Usable:
     """The recordings with the zero of each clock where a drop begins; those without a speed have their stamps only.
 
     Raises `InputError` for a condition that the scenario does not know.
@@ -65,7 +65,7 @@ def settled(recordings: Mapping[str, Recording], scenario: Scenario) -> Settled:
         zeros |= {} if one.zero is None else {name: one.zero}
     if not found:
         raise InputError(*(Fault(message=reason) for reason in refused))
-    return Settled(recordings=found, zeros=zeros, refused=tuple(refused))
+    return Usable(recordings=found, zeros=zeros, refused=tuple(refused))
 
 
 def drop_of(
@@ -302,4 +302,4 @@ def head(found: Found) -> str:
     return "\n".join([*lines, *found.remarks])
 
 
-__all__ = ["FORMAT", "Found", "Settled", "drop_of", "drops_of", "head", "identified", "settled", "zeros_of"]
+__all__ = ["FORMAT", "Found", "Usable", "drop_of", "drops_of", "head", "identified", "usable", "zeros_of"]

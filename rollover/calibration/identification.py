@@ -125,15 +125,15 @@ def identified(
         message = f"to_depth: of law ye-2006 alone, got law {form}; without it"
         raise InputError(Fault(message=message))
     known = {name: recording for name, (_, recording) in recordings.items()}
-    settled = ground_law.settled(known, scenario)
+    usable = ground_law.usable(known, scenario)
     drops, unusable = ground_law.drops_of(
-        settled.recordings, scenario, buoyancy=buoyancy, terminal=terminal, to_depth=to_depth
+        usable.recordings, scenario, buoyancy=buoyancy, terminal=terminal, to_depth=to_depth
     )
     share = scenario.ground.co_moving_mass.share if fraction is None else fraction
     if form == "ye-2006" and not is_cone:  # which that law refuses
         drops, other = ground_law.of_one_soil(drops, share)
         unusable += other
-    zeros = {**settled.zeros, **ground_law.zeros_of(drops, known)}
+    zeros = {**usable.zeros, **ground_law.zeros_of(drops, known)}
     sources = sorted({recording.source for recording in known.values() if recording.source})
     found = ground_law.identified(
         drops,
@@ -150,7 +150,7 @@ def identified(
         numbers=found.answer,
         table=found.table,
         remarks=(*(f"{name}: {zero.sentence}" for name, zero in zeros.items()), *found.remarks),
-        refused=(*settled.refused, *unusable),
+        refused=(*usable.refused, *unusable),
         zeros=zeros,
     )
 

@@ -49,7 +49,7 @@ FEW = 4  # samples before that will do where what they read is what a fall reads
 DRIFT = 4.0  # noises, that a channel may drift before
 FALLING = 0.5  # of g, within which an accelerometer reads that it falls
 JUMPS = 0.5  # of the jump at a contact, 1 sigma: the mass that moves along is known no better
-SOON, LEAST = 8e-3, 4  # s after an onset, and samples, that tell when it was
+AFTER_ONSET, LEAST = 8e-3, 4  # s after an onset, and samples, that tell when it was
 MODEL = 2e-4  # of a channel's range: what integrators differ by
 PLACES = 601  # zeros that are tried at once
 AT_ONCE = 1_000_000  # samples times zeros, 8 MB an array
@@ -167,7 +167,7 @@ def by_onset(
     about = sorted(onset for onset, _ in seen.values())[(len(seen) - 1) // 2]
     notes = []
     for channel, (at, since) in seen.items():
-        if abs(at - about) <= SOON + LEAST * _step(recording, channel):
+        if abs(at - about) <= AFTER_ONSET + LEAST * _step(recording, channel):
             notes.append((channel, _refined(recording, channel, run, contact, at, since)))
     weight = np.array([s**-2 for _, (_, s) in notes])
     each = np.array([m for _, (m, _) in notes])
@@ -205,7 +205,7 @@ def _is_off(recording: Recording, moved: Recording, scenario: Scenario, simulate
     if contact is None or DEPTH not in zero.channels:
         return False
     begun = contact + zero.late
-    return _is_better(pairs, min(contact, begun), begun + SOON, by=DEPTH)
+    return _is_better(pairs, min(contact, begun), begun + AFTER_ONSET, by=DEPTH)
 
 
 def _is_better(pairs: list[tuple[Part, Part]], start: float, end: float, *, by: str = "") -> bool:
@@ -304,8 +304,8 @@ def _refined(
     sigma = _noise(recording, channel, float(np.ptp(values)))
     onset = about + contact
     late = time[time >= onset]
-    until = max(onset + SOON, float(late[min(LEAST - 1, late.size - 1)]) + 1e-9)
-    back = SOON + LEAST * step
+    until = max(onset + AFTER_ONSET, float(late[min(LEAST - 1, late.size - 1)]) + 1e-9)
+    back = AFTER_ONSET + LEAST * step
     use = (time >= max(since, onset - 4.0 * back)) & (time <= until)
     t, y = time[use], values[use] / sigma
     known = values[: 4 * LENGTH]

@@ -18,9 +18,16 @@ from rollover.diagnosis.probabilities import credible, log_evidence
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.ensemble_validation import restarted_base
 from rollover.diagnosis.selection.explanation import Explanation, kind_of, with_conditions_refitted
-from rollover.diagnosis.selection.forward_step import by_chance, confusion_set, step
-from rollover.diagnosis.selection.scan import score_candidates
+from rollover.diagnosis.selection.forward_step import (
+    by_chance,
+    confusion_set,
+    explains_nearly_all,
+    is_same_family,
+    step,
+)
+from rollover.diagnosis.selection.screening import score_candidates
 from rollover.diagnosis.settings import SETTINGS
+from rollover.effects import EFFECTS
 from rollover.scenario import Scenario
 
 TUNING = SETTINGS.report.grades
@@ -96,9 +103,13 @@ def verdict_on_single_effect(
     that lends itself to, is named however much of it is left.
     """
     nothing: Verdict = "no-mismatch" if is_tolerated(problem, found.base) else "unexplained"
-    if not found.parts or found.parts[0].p_value > SETTINGS.inference.lack_of_fit.p_value:
+    if not found.parts:
         return found.refused(), nothing
     whole, _ = shares(problem, found, groups)
+    is_by_chance = found.parts[0].p_value > SETTINGS.inference.lack_of_fit.p_value
+    # what lends itself to a discrepancy that drops repeat does not predict half of it from drop to drop
+    if is_by_chance and (whole is None or whole.low < TUNING.half_share):
+        return found.refused(), nothing
     if whole is not None and whole.low > 0.0:
         nothing = "unexplained"
     families = {f.candidates[-1].family for f in confusion_set(found.parts[0], groups, problem.samples_per_error)}
@@ -122,20 +133,21 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
     That was estimated from what the best leaves, whose form need not be the right one: a rival that explains nearly all
     that the best does is not excluded where it leaves no more than the discrepancy, or is of the same family. Nor is
     one of those that hold the right one with 95 % by what they leave, (D24), if it explains half as much, or is of the
-    same family.
+    same family. What becomes the best at an end of its range, as a layer a stiffness, is no rival.
     """
-    near = confusion_set(one, groups, problem.samples_per_error)
+    near = confusion_set(one, groups, problem.samples_per_error, is_refuted=True)
     best, start = one.fitted, float(held_out(one.base, groups).chi2.sum())
     most = start - float(held_out(best, groups).chi2.sum())
     probable = credible(problem, one.rivals)
     for rival in one.rivals:
-        becomes_best = len(rival.x) > len(best.x) and is_at_bound(rival)
+        becomes_best = is_at_bound(rival) and best.candidates[-1].id in EFFECTS[rival.candidates[-1].id].becomes
         if becomes_best or any(rival is f for f in near):
             continue
         gain = start - float(held_out(rival, groups).chi2.sum())
-        is_kin = rival.candidates[-1].family == best.candidates[-1].family
-        is_probable = (is_kin or gain > TUNING.half_share * most) and any(rival is f for f in probable)
-        if ((is_kin or is_tolerated(problem, rival)) and gain >= TUNING.nearly_all * most) or is_probable:
+        is_probable = any(rival is f for f in probable) and (
+            is_same_family(rival, best) or gain > TUNING.half_share * most
+        )
+        if is_probable or (is_tolerated(problem, rival) and explains_nearly_all(one, rival, groups)):
             near.append(rival)
     return near
 

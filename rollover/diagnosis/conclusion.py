@@ -38,6 +38,7 @@ from rollover.diagnosis.selection.decision import (
     verdict_on,
 )
 from rollover.diagnosis.selection.explanation import Explanation
+from rollover.diagnosis.selection.forward_step import confusion_set
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     interval_contains_null,
@@ -299,6 +300,8 @@ def _refitted_explanation(
     Also the recordings for validation, under those conditions.
     """
     whole, validation = marginalised_at_fit(problem, explanation, validation, phases)
+    if alike is None and not is_enough(problem, whole.fitted, whole.after):
+        alike = partial(confusion_set, groups=groups, shared=problem.samples_per_error, is_refuted=True)
     return whole, named(problem, whole, groups, alike) if verdict in NAMING else (), validation
 
 

@@ -31,7 +31,9 @@ def at_bounds(effects: Sequence[Named]) -> set[str]:
     A shape that few recordings tell from the strength may lie there.
     """
     return {
-        e.id for e in effects if any(i.at_bound for name, i in e.parameters.items() if name not in EFFECTS[e.id].shapes)
+        e.id
+        for e in effects
+        if any(i.at_bound for name, i in e.parameters.items() if name not in EFFECTS[e.id].secondary)
     }
 
 

@@ -194,7 +194,7 @@ def single_sample_noise(residual: Array, sigma: float, many: int) -> float:
     """Noise (1 sigma) of single samples, of which means of `many` have `sigma`, by their misfit (n,).
 
     Variance of the means and that within them: of coloured noise, as behind a filter, it is no `many` times the means'.
-    The one within is told by the median, as most of the misfit is noise, k = many - 1 degrees of freedom having theirs
+    That within is estimated by the median: most of the misfit is noise, k = many - 1 degrees of freedom having theirs
     at (1 - 2/(9 k))^3 of the mean (Wilson and Hilferty, 1931).
     """
     if many == 1 or residual.size < many:

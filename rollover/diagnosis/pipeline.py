@@ -14,7 +14,7 @@ from rollover.diagnosis.alone import follows_a_law, repeats_its_course
 from rollover.diagnosis.conclusion import Asked, Conclusion, concluded
 from rollover.diagnosis.data.condition_uncertainty import with_rounding_uncertainty
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.data.inconsistent import Aside, find_inconsistencies, without_inconsistent
+from rollover.diagnosis.data.inconsistent import Aside, find_inconsistencies, without_inconsistent, wrong_conditions
 from rollover.diagnosis.data.onset import clock_notes, with_clock_zeros
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
@@ -23,12 +23,10 @@ from rollover.diagnosis.fit.time_shift import clock_outliers, estimate_time_shif
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference.discrepancy import Discrepancy, estimated, learned_from_references, with_discrepancy
 from rollover.diagnosis.inference.taught_course import taught_by
-from rollover.diagnosis.inference.wrong_condition import wrong_conditions
 from rollover.diagnosis.invariants import checked
 from rollover.diagnosis.io import REFERENCE, json_of, recordings_in
-from rollover.diagnosis.late_clocks import with_clock_finding
 from rollover.diagnosis.prepared import prepared, weighted_datasets
-from rollover.diagnosis.reported import reported
+from rollover.diagnosis.reported import reported, with_clock_finding
 from rollover.diagnosis.result import Diagnosis, Estimate
 from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.settings import SETTINGS
@@ -221,14 +219,14 @@ def _beside_estimated_discrepancy(
             )
     if isinstance(other, Diagnosis):
         return None
-    says_more = bool(other.effects) or (
+    explains_more = bool(other.effects) or (
         other.verdict == "no-mismatch" and learned.is_usual and not _is_reproduced(other)
     )
-    return reported(other) if says_more else None
+    return reported(other) if explains_more else None
 
 
 def _is_reproduced(found: Conclusion) -> bool:
-    """Whether what nothing explains carries over to recordings that were held out, by its course or by a law."""
+    """Whether the unexplained residual carries over to recordings that were held out, as it is or by a law."""
     problem, scenario = found.problem, found.asked.scenario
     if scenario is None or found.acts != "drop":
         return False  # nothing predicts the course of an overturn but a run

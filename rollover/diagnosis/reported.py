@@ -1,16 +1,19 @@
-"""A conclusion as it is reported: places, dependence, scores, one sentence."""
+"""A conclusion as it is reported: places, dependence, scores, one sentence; clocks that are far off as a finding."""
 
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from rollover.diagnosis.conclusion import Conclusion
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import inconsistency_sentences
 from rollover.diagnosis.data.repeatability import contradiction_clause, inconsistent_repeats
-from rollover.diagnosis.fit.cross_validation import HeldOutMisfit
+from rollover.diagnosis.fit.cross_validation import HeldOutMisfit, held_out
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.time_shift import clock_offset_sentence, clock_outliers
 from rollover.diagnosis.forward.full_run import full_runs
@@ -23,7 +26,8 @@ from rollover.diagnosis.inference.scores import judged, misfit_before_impact
 from rollover.diagnosis.inference.vehicle_dependence import dependency, misfit_by_degree_of_freedom
 from rollover.diagnosis.planning.next_test import next_test
 from rollover.diagnosis.probabilities import NOTHING, probabilities
-from rollover.diagnosis.result import Degree, Diagnosis, Draws, Named, Share, Verdict
+from rollover.diagnosis.result import Degree, Diagnosis, Draws, Interval, Named, Share, Verdict
+from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     by_share,
@@ -38,7 +42,10 @@ from rollover.diagnosis.statements import (
     tolerance_clause,
     usual_model_error_sentence,
 )
-from rollover.effects import spoken
+from rollover.effects import EFFECTS, spoken
+
+LATE_CLOCKS = SETTINGS.report.late_clocks
+CLOCK_OFFSET = "sensor-clock-offset"
 
 
 def reported(c: Conclusion) -> Diagnosis:
@@ -225,3 +232,57 @@ def _cost(found: Sequence[Dataset]) -> list[str]:
     made = [s for e in found if (s := full_runs(e.simulator)) is not None]
     runs, seconds = sum(s.runs for s in made), sum(s.seconds for s in made)
     return [f"{runs} full runs of {1e3 * seconds / runs:.0f} ms on the average"] if runs else []
+
+
+def with_clock_finding(found: Diagnosis, late: Mapping[str, float], problem: Problem, tried: Explanation) -> Diagnosis:
+    """A diagnosis made with clocks set right that were `late` (s, by recording), with that as its first finding."""
+    groups = [[r] for r in range(len(problem.dataset))]
+    before, held = judged(problem, tried.base, [], groups), held_out(tried.base, groups).total
+    clocks = _named(late, problem, tried.p_value)
+    rest = f" Beside that: {found.sentence}" if found.effects else ""
+    after = {n: a for n, _, a in found.per_recording}
+    end = found.after.get("held_out", found.after["training"]).nrmse
+    return replace(
+        found,
+        verdict=found.verdict if found.effects else "sensor",
+        answer=found.answer if found.effects else "whole",
+        sentence=f"{clocks[0].statement} With it the misfit falls from {held:.1f} to {end:.2f} times the noise.{rest}",
+        p_value=tried.p_value,
+        effects=(*clocks, *found.effects),
+        before=before.scores,
+        per_recording=tuple((n, b, after.get(n, b)) for n, b in before.by_recording),
+    )
+
+
+def _named(late: Mapping[str, float], problem: Problem, p_value: float) -> tuple[Named, ...]:
+    """One finding for each channel where all recordings are as late, which a scenario can be told; else one of all."""
+    from scipy.special import stdtrit
+
+    values = np.array(list(late.values()))
+    is_common = len(late) == len(problem.dataset) and float(np.ptp(values)) < 2.0 * SETTINGS.data.dataset.shift_prior
+    value, n = float(np.mean(values)), values.size
+    error = max(float(np.std(values, ddof=1)) / np.sqrt(n) if n > 1 else 0.0, 0.1 * SETTINGS.data.dataset.shift_prior)
+    wide = float(stdtrit(max(n - 1, 1), SETTINGS.report.grades.one_sided_confidence)) * error
+    way = "late" if value > 0.0 else "early"
+    each = ", ".join(f"{spoken(abs(s) * 1e3)} ms {'late' if s > 0.0 else 'early'} ({name})" for name, s in late.items())
+    statement = (
+        f"All channels of all recordings come {spoken(abs(value) * 1e3)} ms {way}: their common clock is off."
+        if is_common
+        else f"Clocks of recordings are off: {each}."
+    )
+    channels = list(dict.fromkeys(s.channel for e in problem.dataset for s in e.signals))
+    own: list[str | None] = [*channels] if is_common and len(channels) <= LATE_CLOCKS.most_channels else [None]
+    return tuple(
+        Named(
+            id=CLOCK_OFFSET,
+            kind="sensor",
+            statement=statement,
+            parameters={"offset": Interval(value=value, low=value - wide, high=value + wide, unit="s")},
+            settings={} if channel is None else {"channel": channel, "offset": value},
+            channel=channel,
+            p_value=p_value,
+            indistinguishable_from=(),
+            discriminating_test=next(iter(EFFECTS[CLOCK_OFFSET].rivals.values()), ""),
+        )
+        for channel in own
+    )

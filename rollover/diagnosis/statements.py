@@ -62,7 +62,7 @@ def named(
             Named(
                 id=c.id,
                 kind=c.kind,
-                statement=" ".join([effect.says(), *same.values(), *_clock_ambiguity(problem, c, values)]),
+                statement=" ".join([effect.statement(), *same.values(), *_clock_ambiguity(problem, c, values)]),
                 parameters=parameters,
                 settings=values,
                 channel=c.channel,
@@ -107,7 +107,7 @@ def is_null_effect(effect: Named) -> bool:
 def interval_contains_null(effects: Sequence[Named], scattering: bool) -> set[str]:
     """Ids of those that may be none of what they are said to be: their gain is another's, or chance of the runs.
 
-    One alone has no other's gain: where runs are not `scattering` it is there, only how strong it is cannot be told. So
+    One alone has no other's gain: where runs are not `scattering` it is there, its strength cannot be estimated. So
     it is with what does something at its least.
     """
     if len(effects) == 1 and (not scattering or EFFECTS[effects[0].id].is_discontinuous):
@@ -167,7 +167,7 @@ def usual_model_error_sentence(
 ) -> str:
     """The sentence where all is met but for an estimated background, a share of each channel's range.
 
-    `best` is the effect that predicts most of it, with its share, which is told where it surely predicts some.
+    `best` is the effect that predicts most of it, with its share, which is stated where it surely predicts some.
     """
     some = ""
     if best is not None and best[1].low > 0.0:

@@ -103,6 +103,7 @@ def bodies_of(
     if vehicle.trailer is not None:
         surfaces = tuple(sampled(vehicle.trailer.outline) + loads("trailer") + walls("trailer"))
         found.append(Body(name="trailer", inertia=carried(vehicle, "trailer"), surfaces=surfaces))
+    found += [Body(name=b.part, inertia=b.body, surfaces=tuple(walls(b.part))) for b in vehicle.bogies]
     found += [Body(name=n, inertia=i, surfaces=tuple(walls(n))) for n, i in hubs(vehicle).items()]
     if vehicle.occupant is not None:
         outlines = vehicle.occupant.outlines

@@ -33,7 +33,7 @@ LONGEST_STEP = 5e-4  # s, of the integration
 ENTRY = 0.02  # longest step over the time in which a cone goes in
 ROUNDING = 1e-6  # of the largest force: what changes by less has not jumped
 BESIDE = 1e-9  # s: on either side of a jump
-TOLD = 64  # grounds with their effects, of which the kernel's numbers are kept: drops share them
+CACHED_GROUNDS = 64  # grounds with their effects, of which the kernel's numbers are kept: drops share them
 RESOLVED = 0.15  # longest step times the frequency of a compliant striker
 
 COLUMNS = {
@@ -187,7 +187,7 @@ class DropModel:
         return read(self.scenario.effects, recording)
 
 
-@lru_cache(maxsize=TOLD)
+@lru_cache(maxsize=CACHED_GROUNDS)
 def _kernel_law(law: Itself, effects: Itself) -> tuple[NDArray[np.int64], Array]:
     return settings(law.thing, *acting(effects.thing))
 

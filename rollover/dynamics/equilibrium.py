@@ -35,7 +35,7 @@ from rollover.kernels.tyres import tyre_point
 from rollover.spec.frames import from_angles
 
 Array = NDArray[np.float64]
-OWN = ("rops", "trailer", "hub_")
+OWN = ("rops", "trailer", "bogie_", "hub_")
 TOLERANCE = 1e-7  # of forces and moments over the weight
 FREE = 1.0  # m or rad: a play that no part of a ROPS leaves
 BEYOND, STEP = math.radians(15.0), math.radians(1.0)  # of the inward search: from past the stiff balance, in degrees
@@ -68,7 +68,7 @@ def _root(f: Callable[[float], float], low: float, high: float) -> float:
 
 
 class Equilibrium:
-    """Few coordinates u: height, roll, pitch, axle angle, slide (2), yaw; shift (3) and tilt (3) of each sprung body.
+    """Few coordinates u: height, roll, pitch, axle angle, slide (2), yaw; shift (3) and tilt (3) of bodies on springs.
 
     Height is along the surface's normal, slide along it; roll, pitch and yaw turn about the vehicle's origin. The
     residuals are the virtual work of all forces for each coordinate, over the weight. The tyres' stick springs hold
@@ -116,20 +116,54 @@ class Equilibrium:
             d = depths(pitch)
             return float(d[front].max() - d[~front].max())
 
-        if front.any() and not front.all() and uneven(-0.4) * uneven(0.4) < 0.0:
-            deepest = float(depths(_root(uneven, -0.4, 0.4)).max())
-        else:
-            deepest = float(depths(0.0).max())
+        reaches = front.any() and not front.all() and uneven(-0.4) * uneven(0.4) < 0.0
+        deepest = float(depths(_root(uneven, -0.4, 0.4) if reaches else 0.0).max())
+        if roll == 0.0 and self._lay(u):
+            self.residual(u)
+            deepest = float(self.t.wheel_memory[:, E_DEPTH_NOW].max())
         u[0] += deepest - self.scale / float(self.t.wheel_f[:, W_KZ].sum())
         return u
 
     def _upright(self, u: Array, roll: float) -> None:
-        """Turn a trailer back on its hitch by as much as the vehicle is rolled, and as far as it turns."""
-        for (kind, b, *_), f in zip(self.t.link_i, self.t.link_f, strict=True):
-            if kind == JOINT and self.bodies[b].name == "trailer":
-                at, tilt = int(self.part[b]), min(max(-roll, f[L_LOW]), f[L_HIGH])
+        """Turn a trailer with its bogies back on its hitch by as much as the vehicle is rolled, as far as it turns."""
+        for (kind, b, a, *_), f in zip(self.t.link_i, self.t.link_f, strict=True):
+            if kind != JOINT:
+                continue
+            at, under = int(self.part[b]), int(self.part[a])
+            if self.bodies[b].name == "trailer":
+                tilt = min(max(-roll, f[L_LOW]), f[L_HIGH])
                 hitch = f[L_B : L_B + 3]
                 u[at : at + 3], u[at + 3] = hitch - from_angles(tilt, 0.0, 0.0) @ hitch, tilt
+            elif self.bodies[a].name == "trailer":
+                tilt, apart = u[under + 3], self.centre[b] - self.centre[a]
+                u[at : at + 3] = u[under : under + 3] + from_angles(tilt, 0.0, 0.0) @ apart - apart
+                u[at + 3] = tilt
+
+    def _lay(self, u: Array) -> bool:
+        """Swing each bogie within its stops until wheels ahead of its pin are as deep as those behind; if any was."""
+        pins = [
+            (int(b), f)
+            for (kind, b, *_), f in zip(self.t.link_i, self.t.link_f, strict=True)
+            if kind == JOINT and self.bodies[b].name.startswith("bogie_")
+        ]
+        return sum(self._lie(u, b, f) for b, f in pins) > 0  # each of them
+
+    def _lie(self, u: Array, b: int, f: Array) -> bool:
+        """Swing one bogie, body b on the pin f, so; whether it reaches."""
+        at, pin, on = int(self.part[b]), f[L_B : L_B + 3].copy(), self.t.wheel_i == b
+        base, ahead = u[at : at + 3].copy(), self.t.wheel_f[:, 0] > pin[0]
+
+        def uneven(angle: float) -> float:
+            swung = from_angles(u[at + 3], angle, 0.0) - from_angles(u[at + 3], 0.0, 0.0)
+            u[at : at + 3], u[at + 4] = base - swung @ pin, angle
+            self.residual(u)
+            d = self.t.wheel_memory[:, E_DEPTH_NOW]
+            return float(d[on & ahead].max() - d[on & ~ahead].max())
+
+        low, high = float(f[L_LOW + 1]), float(f[L_HIGH + 1])
+        reaches = uneven(low) * uneven(high) < 0.0
+        uneven(_root(uneven, low, high) if reaches else 0.0)
+        return reaches
 
     def placed(self, u: Array) -> tuple[Array, Array]:
         """Generalised coordinates (6 nb,) of all bodies, and their velocities (size, 6 nb) for a unit rate of each u.
@@ -229,9 +263,9 @@ class Equilibrium:
         eps = 1e-7
         slopes = np.empty((len(free), len(free)))
         for column, k in enumerate(free):
-            nudged = u.copy()
-            nudged[k] += eps
-            slopes[:, column] = (self.residual(nudged)[free] - r) / eps
+            stepped = u.copy()
+            stepped[k] += eps
+            slopes[:, column] = (self.residual(stepped)[free] - r) / eps
         return -np.asarray(np.linalg.lstsq(slopes, r, rcond=1e-10)[0])
 
     def _by_springs(self, u: Array, r: Array, free: list[int]) -> Array:

@@ -1,4 +1,4 @@
-"""Rows of the kernels' tables for what links bodies: an occupant, a trailer's hitch, struts; channels of these two."""
+"""Rows of the kernels' tables for what links bodies: an occupant, hitch, bogies, struts; channels of the last three."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rollover.dynamics.occupant import Point, Row, occupant_rows
 from rollover.kernels import links as k
 from rollover.kernels.tables import HITCH, SUSPENSION
 from rollover.scenario import Scenario
+from rollover.spec.bogie import Bogie, damped
 from rollover.spec.frames import angles, matrices, rotation_vector
 from rollover.spec.suspension import GUIDE
 from rollover.spec.vehicle import Vehicle, Wheel
 
 Array = NDArray[np.float64]
-DAMPED = 0.1  # of critical, of a wheel in its guide
 
 
 def link_rows(
@@ -36,6 +36,11 @@ def link_rows(
             at = [*about("trailer", hitch.position), *about("chassis", hitch.position)]
             rows.append(([k.JOINT, b, a, out, HITCH], [*at, hitch.stiffness, hitch.damping, *hitch.turns.row]))
             out += 6
+        for bogie in vehicle.bogies:
+            below = carrier_of(vehicle, bogie)
+            at = [*about(bogie.part, bogie.pivot), *about(below, bogie.pivot)]
+            rows.append(([k.JOINT, row[bogie.part], row[below], out, SUSPENSION], [*at, *bogie.row]))
+            out += 6
         for wheel in sprung(vehicle):
             at = [*about(wheel.hub, wheel.centre), *about("chassis", wheel.centre)]
             rows.append(([k.STRUT, row[wheel.hub], row["chassis"], out, SUSPENSION], [*at, *_strut(wheel)]))
@@ -51,13 +56,18 @@ def sprung(vehicle: Vehicle) -> list[Wheel]:
     return [w for w in vehicle.wheels if w.suspension is not None]
 
 
+def carrier_of(vehicle: Vehicle, bogie: Bogie) -> str:
+    """Name of the body that a bogie's pin is on: that of its wheels."""
+    return next(w.carrier for w in vehicle.wheels if w.bogie == bogie.name)
+
+
 def _strut(wheel: Wheel) -> list[float]:
     """Numbers of a strut after its points: held stiffly along x and y and about all axes, sprung along z."""
     s, tyre = wheel.suspension, wheel.tyre
     assert s is not None
     across = GUIDE * max(tyre.vertical_stiffness, tyre.lateral_stiffness)
     about, inertia = across * tyre.radius**2, s.hub(wheel.centre, tyre.radius, tyre.width).inertia
-    dashpot, damper = (2.0 * DAMPED * math.sqrt(stiff * m) for stiff, m in ((across, s.mass), (about, max(inertia))))
+    dashpot, damper = damped(across, s.mass), damped(about, max(inertia))
     free = [-math.pi] * 3 + [math.pi] * 3
     along = [s.stiffness, s.damping, s.preload, -s.droop, s.bump, s.stop_stiffness]
     return [across, dashpot, *[about] * 3, *[damper] * 3, *free, 0.0, *along]
@@ -66,10 +76,10 @@ def _strut(wheel: Wheel) -> list[float]:
 def link_channels(
     vehicle: Vehicle, links: Array, q: Array, bodies: tuple[Body, ...], row: dict[str, int]
 ) -> dict[str, Array]:
-    """Channels of hitch and struts, SI, each (n,), from rows of `link_out` (n, no) and the bodies' places."""
+    """Channels of hitch, bogies and struts, SI, each (n,), from rows of `link_out` (n, no) and the bodies' places."""
     found: dict[str, Array] = {}
     wheels = sprung(vehicle)
-    at = links.shape[1] - 6 * (len(wheels) + (vehicle.trailer is not None))
+    at = links.shape[1] - 6 * (len(wheels) + len(vehicle.bogies) + (vehicle.trailer is not None))
     R = matrices(q[:, row["chassis"], 3:])
     if vehicle.trailer is not None:
         found["hitch/force"] = np.linalg.norm(links[:, at : at + 3], axis=1)
@@ -78,6 +88,12 @@ def link_channels(
         turn = np.array([rotation_vector(own) for own in np.einsum("nji,njk->nik", R, R_trailer)])
         found |= {f"hitch/angle_{axis}": turn[:, j] for j, axis in enumerate("xyz")}
         found["trailer/roll"], found["trailer/pitch"], found["trailer/yaw"] = angles(q[:, row["trailer"], 3:])
+        at += 6
+    for bogie in vehicle.bogies:
+        below, own = (matrices(q[:, row[name], 3:]) for name in (carrier_of(vehicle, bogie), bogie.part))
+        turn = np.array([rotation_vector(one) for one in np.einsum("nji,njk->nik", below, own)])
+        found[f"bogie/{bogie.name}/angle"] = turn[:, 1]
+        found[f"bogie/{bogie.name}/force"] = np.linalg.norm(links[:, at : at + 3], axis=1)
         at += 6
     for wheel in wheels:
         b, c = row[wheel.hub], row["chassis"]

@@ -17,7 +17,7 @@ from rollover.dynamics.history import History
 from rollover.dynamics.result import Event
 from rollover.dynamics.setup import Rig
 from rollover.dynamics.stands.control import Control
-from rollover.dynamics.validity import told_by_laws
+from rollover.dynamics.validity import calibrated_by_laws
 from rollover.kernels import time_loop as loop
 from rollover.kernels.dense import largest
 from rollover.kernels.step import end_of_step
@@ -46,7 +46,7 @@ def watch_of(scenario: Scenario, t: Tables, steps: int, start: float) -> loop.Wa
     """Room for the rows of a run, and what its loop needs to know."""
     h = scenario.simulation.step
     every = max(1, round(scenario.simulation.output_step / h))
-    uncalibrated, deepest = told_by_laws(scenario.ground.every_law)
+    uncalibrated, deepest = calibrated_by_laws(scenario.ground.every_law)
     begin, drive = scenario.initiation, np.zeros(0)
     if isinstance(begin, Driving) and begin.drive is not None and begin.drive.torque is not None:
         drive = np.zeros(DRIVE_NUMBERS)

@@ -13,7 +13,7 @@ from rollover.kernels import tables as c
 FLAG_NAMES = {**c.FLAG_NAMES, c.UNCALIBRATED: "uncalibrated", c.DEEP: "deep-sinkage"}
 
 
-def told_by_laws(laws: Sequence[GroundLaw]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+def calibrated_by_laws(laws: Sequence[GroundLaw]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Of each law (nr,) whether nothing measured stands behind it, and how deep what was measured went, m."""
     domains = [law.domain for law in laws]
     return np.array([not domain.calibrated for domain in domains]), np.array([float(d.sinkage_most) for d in domains])

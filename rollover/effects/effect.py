@@ -75,9 +75,11 @@ class Effect:
     competes: ClassVar[bool] = True  # as an explanation of what a scenario misses
     null: ClassVar[Mapping[str, float | None]] = {}
     search: ClassVar[Mapping[str, Search]] = {}
-    shapes: ClassVar[tuple[str, ...]] = ()  # parameters that few recordings tell from the strength: mostly at default
+    secondary: ClassVar[
+        tuple[str, ...]
+    ] = ()  # parameters that few recordings tell from the strength: mostly at default
     forms: ClassVar[tuple[Form, ...]] = ()  # what else goes by its name, no matter of degree
-    narrow: ClassVar[
+    local_starts: ClassVar[
         Mapping[str, tuple[float, ...]]
     ] = {}  # parameter -> places in its range, near which alone it tells
     is_abrupt: ClassVar[bool] = False  # it rings, or turns from one instant to the next: drops take shorter steps
@@ -93,10 +95,12 @@ class Effect:
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {}
 
     def __init_subclass__(cls) -> None:
-        """Enter the table. Raises ``TypeError`` for a class without an id and for an id given twice."""
+        """Enter the table. Raises ``TypeError`` for one without an id, an id given twice, an old name."""
         known = EFFECTS.get(cls.id)
         if not cls.id:
             raise TypeError(f"{cls.__module__}.{cls.__name__}: an effect needs an `id`")
+        if "shapes" in vars(cls):  # its name until 0.1: unread, such a parameter would be fitted as a strength is
+            raise TypeError(f"{cls.__module__}.{cls.__name__}: `shapes` is named `secondary`")
         if (
             known is not None
             and is_current(known)
@@ -140,7 +144,7 @@ class Effect:
         """Ids of other effects beside which it does the very same at other values, and the sentence that says so."""
         return {}
 
-    def says(self) -> str:
+    def statement(self) -> str:
         """The sentence, with the values in it; that of its form, if it is in one that has a sentence of its own."""
         own = (f for f in self.forms if f.sentence and all(getattr(self, n) == v for n, v in f.fixed.items()))
         sentence = next((f.sentence for f in own), self.sentence)

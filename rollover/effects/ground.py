@@ -55,7 +55,7 @@ class SoilViscousDamping(Effect):
     channels = FORCE
     null: ClassVar[Mapping[str, float | None]] = {"damping": 0.0, "proportion": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"damping": Search(30.0, 1e4, "log"), "exponent": Search(0.5, 2.0)}
-    shapes = ("exponent",)
+    secondary = ("exponent",)
     forms = (
         Form(
             {"damping": 0.0},
@@ -105,7 +105,7 @@ class SoilRateHardening(Effect):
         "per_decade": Search(0.01, 0.5, "log"),
         "reference_speed": Search(1e-3, 2.0, "log"),
     }
-    shapes = ("reference_speed",)
+    secondary = ("reference_speed",)
     forms = (
         Form({"per_decade": 0.0}, {"power": POWERS, "reference_speed": Search(1e-3, 2.0, "log")}, BY_POWER),
         Form(
@@ -193,7 +193,7 @@ class SoilAddedMassGrowth(Effect):
     channels = FORCE
     null: ClassVar[Mapping[str, float | None]] = {"rate": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"rate": Search(1.0, 300.0, "log"), "fade": Search(3e-4, 0.03, "log")}
-    shapes = ("fade",)
+    secondary = ("fade",)
 
     @classmethod
     def looked_for(cls, parameter: str, search: Search, scenario: Any) -> Search | None:
@@ -269,7 +269,7 @@ class SoilAdhesion(Effect):
     channels = ("ground/force_normal",)
     null: ClassVar[Mapping[str, float | None]] = {"stress": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"stress": Search(500.0, 2e5, "log"), "reach": Search(5e-4, 0.05, "log")}
-    shapes = ("reach",)
+    secondary = ("reach",)
     is_discontinuous = True  # what moves along stays on the face until it lets go
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"stress": (1.0, -1.0)}
 
@@ -307,7 +307,7 @@ class SoilLayer(Effect):
         "stiffness_ratio": Search(0.2, 8.0, "log"),
         "width": Search(1e-3, 0.1, "log"),
     }
-    shapes = ("width",)
+    secondary = ("width",)
     becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {
         "soil-stiffness": {"scale": ("stiffness_ratio", 1.0)}
     }
@@ -355,7 +355,7 @@ class SoilCrust(Effect):
         "stiffness_ratio": Search(0.2, 8.0, "log"),
         "width": Search(1e-3, 0.1, "log"),
     }
-    shapes = ("width",)
+    secondary = ("width",)
     becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {
         "soil-stiffness": {"scale": ("stiffness_ratio", 1.0)}
     }

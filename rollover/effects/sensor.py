@@ -144,7 +144,7 @@ class SensorLag(Effect):
     }
     null: ClassVar[Mapping[str, float | None]] = {"time": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"time": Search(1e-4, 0.05, "log"), "second_order": Search(0.0, 1.0)}
-    shapes = ("second_order",)
+    secondary = ("second_order",)
 
     def validate(self) -> None:
         """Refuse a channel that does not exist."""

@@ -44,7 +44,7 @@ class GuideFriction(Effect):
         "force": Search(5.0, 600.0, "log"),
         "creep": Search(5e-4, 0.05, "log"),
     }
-    shapes = ("creep",)
+    secondary = ("creep",)
     is_abrupt = True
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"force": (1.0, 0.0)}
 
@@ -82,7 +82,7 @@ class AirDrag(Effect):
         "area": Search(1e-3, 10.0, "log"),
         "crisis_speed": Search(5.0, 40.0, "log"),
     }
-    shapes = ("crisis_speed",)
+    secondary = ("crisis_speed",)
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"area": (2.0 / 3.0, 0.0)}
 
     @classmethod
@@ -134,7 +134,7 @@ class StructuralCompliance(Effect):
         "damping": Search(10.0, 1e4, "log"),
         "nose_share": Search(0.02, 0.6, "log"),
     }
-    shapes = ("nose_share",)
+    secondary = ("nose_share",)
     forms = (Form({"clings": 1.0}, {}),)
     is_abrupt = True
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"stiffness": (1.0, 0.0), "damping": (1.0, 0.0)}

@@ -162,7 +162,7 @@ class AxleStop(Effect):
     channels = ("axle/front/angle", "chassis/angular_velocity_x")
     null: ClassVar[Mapping[str, float | None]] = {"angle": None, "stiffness": None}
     search: ClassVar[Mapping[str, Search]] = {"angle": Search(0.02, 0.5), "stiffness": Search(1e4, 1e7, "log")}
-    shapes = ("stiffness",)
+    secondary = ("stiffness",)
 
     def changes(self, scenario: Any) -> Mapping[str, Any]:
         """Swing and stiffness of the stops."""
@@ -262,7 +262,7 @@ class TankSlosh(Effect):
         "length": Search(0.05, 3.0, "log"),
         "damping": Search(0.0, 0.3),
     }
-    shapes = ("damping",)
+    secondary = ("damping",)
 
 
 @parameters
@@ -291,7 +291,7 @@ class PayloadShift(Effect):
         "travel": Search(0.02, 1.0, "log"),
         "friction": Search(0.0, 1.0),
     }
-    narrow: ClassVar[Mapping[str, tuple[float, ...]]] = {  # it meets its wall at a moment that its travel sets
+    local_starts: ClassVar[Mapping[str, tuple[float, ...]]] = {  # it meets its wall at a moment that its travel sets
         "travel": tuple(0.1 + 0.022 * k for k in range(36)),
         "friction": (0.25, 0.5),
     }

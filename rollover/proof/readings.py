@@ -94,8 +94,8 @@ def stamps_of(shot: Shot, index: int) -> Array:
     count = int((shot.end - shot.start) * shot.rate) + 1
     t = shot.start + shot.late + np.arange(count) / shot.rate
     if shot.uneven:
-        stray = np.random.default_rng([index, count, int(1e6 * shot.speed)])
-        t = t + stray.uniform(-shot.uneven, shot.uneven, count) / shot.rate
+        jitter = np.random.default_rng([index, count, int(1e6 * shot.speed)])
+        t = t + jitter.uniform(-shot.uneven, shot.uneven, count) / shot.rate
     return np.asarray(np.round(t, 9))
 
 

@@ -36,7 +36,7 @@ HELD = 0.0  # the way of a guide (1: the striker slides down on it) that lets no
 RTOL, ATOL = 1e-9, 1e-11
 MOST_STAGES = 4000
 WITHIN = 12  # places of a step at which it is asked whether the soil would have to be pulled
-NUDGE = 1e-11  # m: past an event, so that it does not answer again
+PAST_EVENT = 1e-11  # m: past an event, so that it does not answer again
 BREAKS = 1.0 + 1e-6  # times its friction a guide holds what has come to rest; by as much more it lets go
 
 
@@ -225,16 +225,16 @@ def descend(rig: Rig, start: float, end: float) -> Descent:
             line = line_back(rig, curve, t, x, 0.0)
             critical = 2.0 * math.sqrt(line.stiffness * (rig.mass + soil))
             line = line_back(rig, curve, t, x, rig.unloading_ratio * critical)
-            mode, x, v = LINE, x - NUDGE, 0.0
+            mode, x, v = LINE, x - PAST_EVENT, 0.0
         elif happened == "deeper":
-            mode, x, origin = LOADING, x + NUDGE, x
+            mode, x, origin = LOADING, x + PAST_EVENT, x
         elif happened == "step":
-            x += NUDGE
+            x += PAST_EVENT
         elif happened == "turned":
             v = 0.0
         elif happened == "lift-off":
             mode, soil, growing = FREE, 0.0, False
-            x -= NUDGE
+            x -= PAST_EVENT
         elif happened == "soil stays":
             soil, growing = 0.0, False
         elif happened == "touch":

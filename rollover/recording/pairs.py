@@ -31,11 +31,12 @@ def write_pairs(values: Mapping[str, float], about: Mapping[str, Any], path: Pat
     table = pa.table({"name": pa.array(list(values), pa.string()), "value": numbers})
     table = table.replace_schema_metadata({KEY: json.dumps(about)})
     # small as they are, dictionaries and statistics would be most of the file
-    put(path, lambda at: pq.write_table(table, at, compression="none", use_dictionary=False, write_statistics=False))
+    small = {"compression": "none", "use_dictionary": False, "write_statistics": False}
+    put(path, lambda at: pq.write_table(table, at, write_page_checksum=True, **small))
 
 
 def read_pairs(path: Path) -> tuple[dict[str, float], dict[str, Any]]:
-    """What `write_pairs` wrote, to the last bit. Raises `UnreadableError`."""
+    """What `write_pairs` wrote, to the last bit. Raises `UnreadableError`, also where a bit has turned since."""
     import pyarrow as pa
 
     try:
@@ -61,7 +62,7 @@ def write_table(
     fields = [pa.field(name, array.type, metadata=dict(meanings.get(name, {}))) for name, array in arrays.items()]
     schema = pa.schema(fields, metadata={KEY: json.dumps(about)})
     table = pa.Table.from_arrays(list(arrays.values()), schema=schema)
-    put(path, lambda at: pq.write_table(table, at))
+    put(path, lambda at: pq.write_table(table, at, write_page_checksum=True))
 
 
 def read_table(path: Path) -> tuple[dict[str, list[Any]], dict[str, Any]]:
@@ -77,10 +78,13 @@ def read_table(path: Path) -> tuple[dict[str, list[Any]], dict[str, Any]]:
 
 
 def _opened(path: Path) -> Any:
-    """An open Parquet file, whose claims are within bounds. Raises `InputError`, which is a ``ValueError``."""
+    """An open Parquet file, whose claims are within bounds; pages are held against their checksums where they have any.
+
+    Raises `InputError`, which is a ``ValueError``; what reads a damaged page ``OSError``.
+    """
     import pyarrow.parquet as pq
 
-    file = pq.ParquetFile(path)
+    file = pq.ParquetFile(path, page_checksum_verification=True)
     Budget(path).claim(IN_LIST * file.metadata.num_rows * max(1, file.metadata.num_columns))
     return file
 

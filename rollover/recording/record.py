@@ -117,10 +117,37 @@ class Recording:
         return found
 
     def until(self, n: int) -> Recording:
-        """The first n stamps, with their values."""
+        """The beginning of a recording.
+
+        Parameters
+        ----------
+        n
+            How many stamps.
+
+        Returns
+        -------
+        Recording
+            The first n stamps, with their values.
+        """
         return replace(self, time=self.time[:n], channels={c: v[:n] for c, v in self.channels.items()})
 
     def samples(self, name: str) -> tuple[Array, Array]:
-        """Time and values of a channel where it has any, (k,) and (k,)."""
+        """Samples of a channel that are there: gaps (NaN) left out.
+
+        Parameters
+        ----------
+        name
+            The channel.
+
+        Returns
+        -------
+        tuple
+            Time (k,), s, and values (k,), SI.
+
+        Raises
+        ------
+        KeyError
+            For a channel that the recording does not have.
+        """
         there = np.isfinite(self.channels[name])
         return self.time[there], self.channels[name][there]

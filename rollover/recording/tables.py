@@ -19,13 +19,13 @@ from rollover.recording.text_rows import (
     Dialect,
     Numbers,
     cells_of,
+    distinct_names,
     fitted,
     lines_of,
     opened,
     refuse,
     skip,
     take,
-    told_apart,
 )
 from rollover.system.boundary import CURE, worded
 from rollover.system.budget import Budget
@@ -54,7 +54,7 @@ def csv_heading(path: Path, dialect: Dialect = PLAIN) -> tuple[list[str], list[l
         refuse(path, "empty, got no row of column names")
     number, text = first
     names = [name.strip() for name in cells_of(text, dialect)]
-    names = told_apart(names) if dialect.loose else names
+    names = distinct_names(names) if dialect.loose else names
     for i, name in enumerate(names):
         if name in names[:i]:
             refuse(path, f"column given twice, got {name!r}; names that differ are needed", number)

@@ -97,7 +97,7 @@ def cells_of(line: str, dialect: Dialect) -> list[str]:
     return next(csv.reader([line], delimiter=dialect.delimiter), [])
 
 
-def told_apart(names: list[str]) -> list[str]:
+def distinct_names(names: list[str]) -> list[str]:
     """Names without the empty ones at the end; those that are empty or stand twice get their place."""
     while names and not names[-1]:
         names.pop()

@@ -25,7 +25,8 @@ def check_standing(vehicle: Vehicle) -> None:
         held = Connector(
             name=w.name, position=foot, stiffness=(side, side, w.tyre.vertical_stiffness), damping=(0.0, 0.0, 0.0)
         )
-        joints.append(Joint(path=f"wheels.{w.name}", below="ground", above=w.carrier, connector=held))
+        above = w.carrier if w.bogie is None else w.hub
+        joints.append(Joint(path=f"wheels.{w.name}", below="ground", above=above, connector=held))
     if vehicle.front_axle is not None:
         stiff = RIGID * max(max(j.connector.stiffness) for j in joints)
         pivot = Connector(
@@ -51,9 +52,21 @@ def check_standing(vehicle: Vehicle) -> None:
         )
         parts["trailer"] = carried(vehicle, "trailer")
         joints.append(Joint(path="trailer.hitch", below="chassis", above="trailer", connector=ball))
+    for b in vehicle.bogies:
+        stiff = RIGID * max(max(j.connector.stiffness) for j in joints[: len(vehicle.wheels)])
+        pin = Connector(
+            name=b.name,
+            position=b.pivot,
+            stiffness=(stiff, stiff, stiff),
+            damping=(0.0, 0.0, 0.0),
+            rotational_stiffness=(stiff, 0.0, stiff),
+        )
+        parts[b.part] = b.body
+        carrier = next(w.carrier for w in vehicle.wheels if w.bogie == b.name)
+        joints.append(Joint(path=f"bogies.{b.name}", below=carrier, above=b.part, connector=pin))
     if motions := free_motions(parts, joints, gravity=0.0):
         free = motions[0]
-        names = [w.name for w in vehicle.wheels if w.carrier in free.parts]
+        names = [w.name for w in vehicle.wheels if w.carrier in free.parts or w.hub in free.parts]
         raise ValueError(
             f"vehicle.wheels: {in_words([free])} on its tyres, got {', '.join(names) or 'no wheel'} to hold it; "
             f"a further wheel off this axis"
@@ -62,10 +75,11 @@ def check_standing(vehicle: Vehicle) -> None:
 
 def check_turning(vehicle: Vehicle) -> None:
     """Raise ``ValueError`` for wheels that turn with more inertia than the body that they are part of."""
-    of: dict[str, MassProperties] = {**hubs(vehicle)}
+    of: dict[str, MassProperties] = {**hubs(vehicle), **{b.part: b.body for b in vehicle.bogies}}
     carriers: tuple[Carrier, ...] = ("front_axle", "chassis", "trailer")
     of |= {carrier: carried(vehicle, carrier) for carrier in carriers if any(w.hub == carrier for w in vehicle.wheels)}
     named = {"front_axle": "their axle", "chassis": "the chassis", "trailer": "the trailer"}
+    named |= {b.part: f"the bogie {b.name}" for b in vehicle.bogies}
     for carrier, whole in of.items():
         wheels = [w for w in vehicle.wheels if w.hub == carrier]
         turning, most = sum(turning_inertia(vehicle, w) for w in wheels), whole.inertia[1]

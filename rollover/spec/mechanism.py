@@ -74,7 +74,7 @@ def free_motions(
     carried = _carried(names, joints)
     for z in _echelon(free @ np.linalg.inv(carried).T) @ carried.T:
         stiffness, needed = float(np.sum((roots @ z) ** 2)), weight * float(z @ z)
-        found.append(_told(z, names, joints, middle, length, (stiffness, needed)))
+        found.append(_free_motion(z, names, joints, middle, length, (stiffness, needed)))
     return tuple(found)
 
 
@@ -164,7 +164,7 @@ def _echelon(free: Array) -> Array:
     return rows
 
 
-def _told(
+def _free_motion(
     z: Array,
     names: Sequence[str],
     joints: Sequence[Joint],

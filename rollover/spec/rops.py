@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ground.kinds import ByKind
 from ground.quantity import Later, Quantity, parameters
 from rollover.spec.beam import Beam
+from rollover.spec.connections import Connection, check_connections
 from rollover.spec.connector import Connector
 from rollover.spec.feet import Foot, side_stiffnesses, springs
 from rollover.spec.inertia import MassProperties
@@ -72,6 +73,9 @@ class Rops:
         tuple[Foot, ...], "where beams stand on the chassis: as stiff and strong as their sections and steel", Later()
     ] = ()
     members: Annotated[tuple[Member, ...], "tubes, beams with a section and boxes that can touch the ground"]
+    connections: Annotated[
+        tuple[Connection, ...], "welds, bolts and cast pieces at ends of members, which `rollover rops` holds", Later()
+    ] = ()
     segments: Annotated[
         int | None,
         Quantity("1", "of each post, which then bends in a run; null: a spring at each foot", least=2, most=100),
@@ -94,6 +98,7 @@ class Rops:
                 raise ValueError(f"{what}: none given; at least one{feet}")
             if len(set(names)) != len(names):
                 raise ValueError(f"{what}: two share a name, got {names}; each name once")
+        check_connections(self.connections, self.beams)
         if self.segments is not None:
             self._posts_bend()
         if free := free_motions({name: body for name, (body, _) in self.parts.items()}, self.joints):

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from ground.quantity import Label, Later, Quantity, parameters
+from rollover.spec.bogie import Bogie, check_bogies
 from rollover.spec.inertia import MassProperties, combined, cuboid
 from rollover.spec.occupant import Occupant, check_room
 from rollover.spec.provenance import Provenance
@@ -70,6 +71,7 @@ class Wheel:
     suspension: Annotated[Suspension | None, Later(), "of a wheel on the chassis; null: it is fixed to its carrier"] = (
         None
     )
+    bogie: Annotated[str | None, Later(), "name of the one on whose beam it stands; null: on its carrier itself"] = None
     rolls: Annotated[
         bool, "turns freely and without inertia, else it is locked; 'driving' turns every wheel by its own inertia"
     ] = False
@@ -85,7 +87,9 @@ class Wheel:
 
     @property
     def hub(self) -> str:
-        """Name of the body that it stands on: its carrier, or its own where it is sprung."""
+        """Name of the body that it stands on: its carrier, a bogie's beam, or its own where it is sprung."""
+        if self.bogie is not None:
+            return f"bogie_{self.bogie}"
         return self.carrier if self.suspension is None else f"hub_{self.name}"
 
 
@@ -159,6 +163,7 @@ class Vehicle:
     attached: Annotated[tuple[Attached, ...], "masses beyond the whole: ballast, implement, driver, tank"] = ()
     occupant: Annotated[Occupant | None, Later(), "who sits on it, as bodies of its own; null: nobody"] = None
     trailer: Annotated[Trailer | None, Later(), "what is articulated behind it; null: nothing"] = None
+    bogies: Annotated[tuple[Bogie, ...], Later(), "beams that carry two wheels or more and swing"] = ()
     contact_spacing: Annotated[float, Quantity("m", "of the contact points on outlines and members", above=0)] = 0.03
     provenance: tuple[Provenance, ...] = ()
 
@@ -176,6 +181,11 @@ class Vehicle:
                 raise ValueError("wheels: a wheel is carried by 'trailer' but there is none; give trailer or 'chassis'")
             if w.suspension is not None and w.carrier != "chassis":
                 raise ValueError(f"wheels.{w.name}.suspension: got it on {w.carrier!r}; null, or carrier 'chassis'")
+            if w.suspension is not None and w.bogie is not None:
+                raise ValueError(f"wheels.{w.name}.suspension: got it on bogie {w.bogie!r}; null, or bogie null")
+        beams = {w.bogie for w in self.wheels if w.bogie is not None}
+        stands = {b: [(w.carrier, w.centre) for w in self.wheels if w.bogie == b] for b in sorted(beams)}
+        check_bogies(self.bogies, stands)
         there = {"chassis": True, "front_axle": self.front_axle, "rops": self.rops, "trailer": self.trailer}
         for a in self.attached:
             if there[a.carried_by] is None:
@@ -184,6 +194,8 @@ class Vehicle:
         if len(set(masses)) != len(masses):
             raise ValueError(f"attached: two masses share a name, got {masses}; each name once")
         chassis_of(self)
+        if self.trailer is not None:
+            carried(self, "trailer")
         if self.occupant is not None:
             check_room(self.occupant, self.outline, self.rops)
 
@@ -226,6 +238,7 @@ class RigidBody:
     wheels: ClassVar[tuple[Wheel, ...]] = ()
     front_axle: ClassVar[None] = None
     trailer: ClassVar[None] = None
+    bogies: ClassVar[tuple[Bogie, ...]] = ()
     occupant: ClassVar[None] = None
     rops: ClassVar[None] = None
     attached: ClassVar[tuple[Attached, ...]] = ()
@@ -237,7 +250,7 @@ class RigidBody:
 
 
 def chassis_of(vehicle: Vehicle | RigidBody) -> MassProperties:
-    """Mass properties of the chassis: the whole less front axle, ROPS and sprung wheels, without attached masses.
+    """Mass properties of the chassis: the whole less its other parts, without attached masses.
 
     Raises ``ValueError`` if the parts weigh more than the whole or leave an inertia that no body can have.
     """
@@ -247,18 +260,18 @@ def chassis_of(vehicle: Vehicle | RigidBody) -> MassProperties:
     parts = [] if vehicle.front_axle is None else [vehicle.front_axle.body]
     if vehicle.rops is not None:
         parts += [body for body, _ in vehicle.rops.parts.values()]
-    parts += hubs(vehicle).values()
+    parts += [*hubs(vehicle).values(), *beams(vehicle, "chassis")]
     heavy = sum(p.mass for p in parts)
     if whole.mass <= heavy:
         raise ValueError(
-            f"whole.mass: front axle, ROPS and sprung wheels weigh more than the vehicle, got {whole.mass:g} kg; "
-            f"greater than {heavy:g} kg is allowed"
+            f"whole.mass: front axle, ROPS, sprung wheels and bogies weigh more than the vehicle, got {whole.mass:g} "
+            f"kg; greater than {heavy:g} kg is allowed"
         )
     try:
         return combined([whole], less=parts)
     except ValueError as e:
         raise ValueError(
-            f"whole.inertia: leaves the chassis, without front axle, ROPS and hubs, an impossible {e}"
+            f"whole.inertia: leaves the chassis, without front axle, ROPS, hubs and bogies, an impossible {e}"
         ) from None
 
 
@@ -268,7 +281,7 @@ def carried(vehicle: Vehicle | RigidBody, carrier: Carrier) -> MassProperties:
         own = chassis_of(vehicle)
     elif carrier == "trailer":
         assert vehicle.trailer is not None
-        own = vehicle.trailer.body
+        own = _without(vehicle.trailer.body, beams(vehicle, "trailer"))
     else:
         part = vehicle.front_axle if carrier == "front_axle" else vehicle.rops
         assert part is not None
@@ -296,14 +309,31 @@ def hubs(vehicle: Vehicle | RigidBody) -> dict[str, MassProperties]:
     }
 
 
+def beams(vehicle: Vehicle | RigidBody, carrier: str) -> list[MassProperties]:
+    """Mass properties of the bogies on the chassis or on the trailer."""
+    on = {w.bogie for w in vehicle.wheels if w.carrier == carrier}
+    return [b.body for b in vehicle.bogies if b.name in on]
+
+
+def _without(whole: MassProperties, parts: list[MassProperties]) -> MassProperties:
+    """A trailer less its bogies. Raises ``ValueError`` if they weigh more or leave an inertia that no body can have."""
+    try:
+        return combined([whole], less=parts) if parts else whole
+    except ValueError as e:
+        raise ValueError(f"trailer.body: less its bogies, {e}") from None
+
+
 def alone(vehicle: Vehicle) -> Vehicle:
     """The same vehicle without its trailer."""
     if vehicle.trailer is None:
         return vehicle
+    wheels = tuple(w for w in vehicle.wheels if w.carrier != "trailer")
+    on = {w.bogie for w in wheels}
     return replace(
         vehicle,
         trailer=None,
-        wheels=tuple(w for w in vehicle.wheels if w.carrier != "trailer"),
+        wheels=wheels,
+        bogies=tuple(b for b in vehicle.bogies if b.name in on),
         attached=tuple(a for a in vehicle.attached if a.carried_by != "trailer"),
     )
 

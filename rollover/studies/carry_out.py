@@ -79,7 +79,7 @@ class Prepared:
             report["run_time"] = ran
             bare: dict[str, Any] = plain(report)
             case_store.put_text(target / case_store.PAGE, page(done, bare))
-            case_store.put_text(target / case_store.ACCOUNT, json.dumps(bare, indent=2, allow_nan=False) + "\n")
+            case_store.put_text(target / case_store.REPORT, json.dumps(bare, indent=2, allow_nan=False) + "\n")
         return report
 
 
@@ -129,8 +129,8 @@ def _begin(ready: Prepared) -> None:
     (target / case_store.LOCK).unlink(missing_ok=True)  # of an earlier version, which locked the folder from within
     head = f"{chosen.title}\nEvery value of the study beside this file."
     case_store.put_text(target / case_store.STUDY, dump(chosen, head))
-    if not (target / case_store.ACCOUNT).exists() or _name_of(target / case_store.ACCOUNT) != name:
-        case_store.put_text(target / case_store.ACCOUNT, json.dumps(_head(ready, "running"), indent=2) + "\n")
+    if not (target / case_store.REPORT).exists() or _name_of(target / case_store.REPORT) != name:
+        case_store.put_text(target / case_store.REPORT, json.dumps(_head(ready, "running"), indent=2) + "\n")
 
 
 def _name_of(report: Path) -> str:
@@ -167,8 +167,8 @@ def _reference(chosen: Study, target: Path, way: Way, watch: Watch, done: Conduc
 
 def _integrators(chosen: Study, done: Conducted) -> str:
     """Which integrator made the cases, both where an axis leads from one to the other."""
-    told = {str(name) for row in done.rows if (name := row.provenance.get("integrator"))}
-    return ", ".join(sorted(told)) or made_by(chosen.scenario.of_many(), chosen.simulator)
+    integrators = {str(name) for row in done.rows if (name := row.provenance.get("integrator"))}
+    return ", ".join(sorted(integrators)) or made_by(chosen.scenario.of_many(), chosen.simulator)
 
 
 def _note(p: Progress) -> str:

@@ -15,14 +15,14 @@ from typing import Any
 from rollover.assessment.results import plain
 from rollover.recording import UnreadableError, put_text, read_pairs, read_table, write_pairs, write_table
 from rollover.studies.case import Result, stated_versions
-from rollover.studies.study import Study, meaning_of, unit_of
+from rollover.studies.study import Study, is_measure, meaning_of, unit_of
 from rollover.system.errors import Fault, InputError
 from rollover.system.own_json import read_json
 from rollover.system.processes import Failure
 from rollover.system.writing import PART, hold, own
 
 FORMAT = "rollover-study-account/1"
-ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK = (
+REPORT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK = (
     "study.json",
     "study.yaml",
     "cases",
@@ -33,8 +33,8 @@ ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK = (
     "worst.yaml",
     ".lock",
 )
-FILES = (ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK)
-TOLD = ("finished", "wall_time", "cpu_time", "peak_memory", "host", "process", "integrator")
+FILES = (REPORT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK)
+EFFORT_COLUMNS = ("finished", "wall_time", "cpu_time", "peak_memory", "host", "process", "integrator")
 PROVENANCE_UNITS = {"wall_time": "s", "cpu_time": "s", "peak_memory": "B"}
 _TYPES = dict.fromkeys(("wall_time", "cpu_time", "peak_memory", "process"), (int, float))  # of what is told; else text
 
@@ -112,9 +112,9 @@ def claim(folder: Path, name: str, *, force: bool) -> Path:
     if force or not set(names) - {LOCK, STUDY}:  # nothing yet, or killed before anything was there
         return target
     try:
-        found = read_json(target / ACCOUNT)
+        found = read_json(target / REPORT)
     except (OSError, ValueError):
-        raise _refused(folder, f"holds results without a {ACCOUNT}; another --out, or --force") from None
+        raise _refused(folder, f"holds results without a {REPORT}; another --out, or --force") from None
     if found.get("format") != FORMAT or found.get("name") != name:
         got = found.get("name", found.get("format", ""))
         raise _refused(folder, f"holds another study, got {got!r}; --force replaces it, --out leaves it")
@@ -152,6 +152,8 @@ def stored(folder: Path, key: str) -> Row | None:
         is_own = is_own and all(v is None or isinstance(v, _TYPES.get(name, str)) for name, v in recorded)
         if not is_own or None in (*measures, *measures.values()) or not all(isinstance(text, str) for text in texts):
             return None  # somebody else wrote it
+        if not all(is_measure(name) for name in measures):
+            return None
         return Row(
             key=key,
             status=about["status"],
@@ -218,7 +220,7 @@ def compact(folder: Path, study: Study, keys: Sequence[str], columns: Mapping[st
         meanings[axis.name] = {"meaning": f"{axis.apply} at {', '.join(axis.paths)}", "unit": ""}
     about = {"format": "rollover-study-table/1", "title": study.title, "versions": stated_versions()}
     write_table(table, folder / TABLE, meanings, about)
-    recorded = {name: [row.provenance.get(name) for row in rows] for name in TOLD}
+    recorded = {name: [row.provenance.get(name) for row in rows] for name in EFFORT_COLUMNS}
     detail = [row.provenance.get("detail", "") for row in rows]
     provenance = {"point": table["point"], "case": table["case"], **recorded, "detail": detail}
     provenance["versions"] = [stated_versions()] * len(rows)

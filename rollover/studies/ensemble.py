@@ -70,7 +70,7 @@ class Spread:
         return statistics.stdev(self.values) / abs(self.mean)
 
 
-def neighbours(scenario: Scenario, starts: int) -> list[Scenario]:
+def perturbed_starts(scenario: Scenario, starts: int) -> list[Scenario]:
     """The scenario itself, then `starts` - 1 whose gravity differs by 1e-6, -1e-6, 2e-6 ... of itself.
 
     Gravity acts in every scenario, however it begins, and nothing about a load depends on it that closely: smooth
@@ -157,14 +157,14 @@ def with_scatter(found: AssessedRun, starts: int, workers: int | None = None) ->
     These run in child processes. Raises `FailedRunError` if one of them fails.
     """
     ensemble = [{(p.channel, f"CFC {p.cfc}"): p.filtered for p in found.peaks}]
-    others = [s.of_many() for s in neighbours(found.scenario, starts)[1:]]
+    others = [s.of_many() for s in perturbed_starts(found.scenario, starts)[1:]]
     histories = []
     for outcome in map_cases(followed, others, workers=workers):
         if outcome.value is None:
             assert outcome.failure is not None
             raise FailedRunError(f"neighbouring start {outcome.index + 2} of {starts}: {outcome.failure.sentence}")
-        told, over_time = outcome.value
-        ensemble.append({e.key: e.value for e in told})
+        own, over_time = outcome.value
+        ensemble.append({e.key: e.value for e in own})
         histories.append(over_time)
     peaks = []
     for peak in found.peaks:

@@ -47,7 +47,7 @@ def checked(
 
     The runs by Exudyn are kept like all cases. A difference is relative to Exudyn's value, or to the loop's where that
     is 0; cases of which only one integrator has a value are counted as `ended_otherwise`. What differs by more than 1 %
-    is held against `neighbours` of its case, see `_beside_neighbours`.
+    is held against perturbed starts of its case, see `_beside_perturbed_starts`.
     """
     some = Points(columns={name: column[list(at)] for name, column in done.points.columns.items()})
     again = evaluate(Builder(study, integrator=REFERENCE), folder, way, some, show)
@@ -56,15 +56,15 @@ def checked(
     for output in study.outputs:
         values = values_of(output, again)
         apart = _apart(values_of(output, before), values)
-        told = [(size, i) for i, size in enumerate(apart) if math.isfinite(size)]
-        every += [size for size, _ in told]
-        largest, i = max(told, default=(None, None))
-        median = float(np.median([size for size, _ in told])) if told else None
+        finite = [(size, i) for i, size in enumerate(apart) if math.isfinite(size)]
+        every += [size for size, _ in finite]
+        largest, i = max(finite, default=(None, None))
+        median = float(np.median([size for size, _ in finite])) if finite else None
         point = None if i is None else at[i]
         outputs.append(
-            {"name": output.name, "cases": len(told), "largest": largest, "median": median, "at_point": point}
+            {"name": output.name, "cases": len(finite), "largest": largest, "median": median, "at_point": point}
         )
-        large += [_Large(output=output, point=at[i], apart=a, value=float(values[i])) for a, i in told if a > LARGE]
+        large += [_Large(output=output, point=at[i], apart=a, value=float(values[i])) for a, i in finite if a > LARGE]
     return {
         "integrator": REFERENCE,
         "cases": len(at),
@@ -73,7 +73,7 @@ def checked(
         "median": float(np.median(every)) if every else None,
         "ended_otherwise": sum(a.status != b.status for a, b in zip(before, again, strict=True)),
         "outputs": outputs,
-        "neighbours": _beside_neighbours(study, folder, way, done, large, show) if large else None,
+        "perturbed": _beside_perturbed_starts(study, folder, way, done, large, show) if large else None,
     }
 
 
@@ -87,7 +87,7 @@ class _Large:
     value: float
 
 
-def _beside_neighbours(
+def _beside_perturbed_starts(
     study: Study, folder: Path, way: Way, done: Conducted, large: Sequence[_Large], show: Show | None
 ) -> dict[str, Any]:
     """What differs much, beside what the loop makes of starts that nobody could tell apart, kept like all cases.
@@ -107,8 +107,8 @@ def _beside_neighbours(
         drawn = values_of(one.output, by_point[one.point])
         drawn = drawn[np.isfinite(drawn)]
         mean = float(drawn.mean()) if drawn.size else None
-        is_told = drawn.size == STARTS and mean is not None
-        scatter = float(drawn.std(ddof=1)) if is_told else 0.0
+        is_known = drawn.size == STARTS and mean is not None
+        scatter = float(drawn.std(ddof=1)) if is_known else 0.0
         responses.append(
             {
                 "name": one.output.name,
@@ -116,9 +116,9 @@ def _beside_neighbours(
                 "difference": one.apart,
                 "value": one.value,
                 "mean": mean,
-                "scatter": scatter / abs(mean) if is_told and mean else None,
+                "scatter": scatter / abs(mean) if is_known and mean else None,
                 "starts": int(drawn.size),
-                "within": bool(abs(one.value - mean) <= WITHIN * scatter) if is_told and mean is not None else None,
+                "within": bool(abs(one.value - mean) <= WITHIN * scatter) if is_known and mean is not None else None,
             }
         )
     return {"starts": STARTS, "cases": len(at), "above": LARGE, "responses": responses}
@@ -134,7 +134,7 @@ def sentence(check: dict[str, Any] | None) -> str:
         found = f"{what}: no response to compare"
     else:
         found = f"{what}: responses differ by {percent(check['median'])} (median), {percent(check['largest'])} at most"
-    if (beside := check.get("neighbours")) is not None:
+    if (beside := check.get("perturbed")) is not None:
         found += f"; {_scattered(beside)}"
     if other := check["ended_otherwise"]:
         found += f"; {other} of them ended otherwise, done by the one and failed by the other"

@@ -11,7 +11,7 @@ from rollover.scenario import Scenario, load
 from rollover.spec import document
 from rollover.studies import baseline as baselines
 from rollover.studies.baseline import Answer, Baseline
-from rollover.studies.ensemble import Extreme, Observed, neighbours, observed
+from rollover.studies.ensemble import Extreme, Observed, observed, perturbed_starts
 from rollover.system.arguments import LONGEST, within
 from rollover.system.errors import Fault, InputError
 from rollover.system.processes import Outcome, map_cases
@@ -125,7 +125,7 @@ def compared(
             faults += e.faults
             continue
         known[file] = (found, scenario)
-        starts += [Start(file=file, scenario=s, half_step=False) for s in neighbours(scenario, found.starts)]
+        starts += [Start(file=file, scenario=s, half_step=False) for s in perturbed_starts(scenario, found.starts)]
     if faults:
         raise InputError(*faults)
     outcomes = _worked_off(starts, workers, time_limit, show)
@@ -191,7 +191,7 @@ def updated(
             answers.append(answer)
             continue
         known[file] = scenario = load(file)
-        for again in neighbours(scenario, baselines.STARTS):
+        for again in perturbed_starts(scenario, baselines.STARTS):
             half = again.replaced({"simulation.step": 0.5 * scenario.simulation.step})
             starts += [
                 Start(file=file, scenario=again, half_step=False),

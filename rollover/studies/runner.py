@@ -81,9 +81,9 @@ class Builder:
         """The scenario of one point, its integrator chosen. Raises ``ValueError`` for values that it does not allow."""
         found = self._changed(values)
         if start := int(values.get(START, 0)):
-            from rollover.studies.ensemble import neighbours  # brings the simulation with it
+            from rollover.studies.ensemble import perturbed_starts  # brings the simulation with it
 
-            found = neighbours(found, start + 1)[start]
+            found = perturbed_starts(found, start + 1)[start]
         if self.study.simulator == "drop":
             return found
         return found.replaced({INTEGRATOR: self.integrator}) if self.integrator else found.of_many()
@@ -233,7 +233,7 @@ def _plan_hash(study: Study, found: Points) -> str:
     """What the keys of a plan depend on: base, axes, values, versions, own effects."""
     digest = hashlib.sha256(document.content_hash(study.scenario).encode())
     axes = [document.to_mapping(axis) for axis in study.axes]
-    told = [
+    parts = [
         axes,
         study.simulator,
         Builder(study).clearance,
@@ -242,7 +242,7 @@ def _plan_hash(study: Study, found: Points) -> str:
         own_files("effects"),
         *filter(None, [own_files("laws")]),
     ]
-    digest.update(json.dumps(told, sort_keys=True).encode())
+    digest.update(json.dumps(parts, sort_keys=True).encode())
     for name, column in found.columns.items():
         digest.update(name.encode())
         digest.update(json.dumps(list(column)).encode() if column.dtype == object else column.tobytes())

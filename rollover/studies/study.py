@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -187,12 +188,12 @@ class Study:
 
 
 def _tried(levels: NDArray[Any]) -> NDArray[Any]:
-    """Levels without those that are there twice; of very many the ends, and as many as `budget.PROBES` between them."""
+    """Levels without those that are there twice; of many the ends, and `budget.LEVELS_TRIED` between them."""
     each = np.array(list(dict.fromkeys(levels.tolist())), dtype=levels.dtype)
-    if len(each) <= budget.PROBES:
+    if len(each) <= budget.LEVELS_TRIED:
         return each
     each = np.sort(each)  # words too: what is wrong with one of them is told at its case
-    return np.asarray(each[np.linspace(0, len(each) - 1, budget.PROBES).astype(int)])
+    return np.asarray(each[np.linspace(0, len(each) - 1, budget.LEVELS_TRIED).astype(int)])
 
 
 def unit_of(measure: str) -> str:
@@ -203,6 +204,16 @@ def unit_of(measure: str) -> str:
     if ending == "impulse":
         return "N s"
     return describe(_described(channel if ending == "raw" else measure)).unit
+
+
+@cache
+def is_measure(name: str) -> bool:
+    """Whether a case is measured by this."""
+    try:
+        unit_of(name)
+    except ValueError:
+        return False
+    return True
 
 
 def axis_unit(scenario: Scenario, axis: AnyAxis) -> str:

@@ -29,14 +29,14 @@ VALUES = 30_000  # of one YAML text, aliases in full: 55 us each, 1.7 s; more th
 ROW = 20  # numbers of a row that cost as much as one other value
 CASES = 1_000_000  # of a study, and levels of an axis: half an hour of drop tests, the shortest case of all
 POINTS = 10 * CASES  # cases times axes: 80 MB for each copy of the table
-PROBES = 200  # levels of an axis that are tried when a study is read, 5 ms each
+LEVELS_TRIED = 200  # levels of an axis that are tried when a study is read, 5 ms each
 MEMORY = 8  # bytes that a reader may take per byte that may be claimed: raw, scaled, stamps, sent, and as many again
 BASE = 500 * MB  # bytes that a reader takes besides, for what it imports while it reads
 PROCESSOR = 4.0  # s for a small file: the slowest reader takes 0.3 s for one
 PER_MB = 10.0  # s per MB of a file: the slowest, messages in JSON in compressed chunks, takes 3 s
 WALL = 60.0  # s beside the processor's, for a disk or network that is slow, or a machine that is busy
 
-_TOLD = 10**15  # counts are told up to here: a file may have a number of a thousand digits
+_MOST_COUNTED = 10**15  # counts are told up to here: a file may have a number of a thousand digits
 
 
 def factor() -> float:
@@ -99,9 +99,9 @@ def check_count(count: int, most: int, refuse: Callable[[str], Exception], what:
     """Refuse more than `most` of something; `refuse` makes the exception of a message."""
     allowed = max(1, int(factor() * most))
     if count > allowed:
-        told = str(count) if count < _TOLD else "more than 1e15"
-        needed = min(count, _TOLD) / allowed
-        raise refuse(f"too many {what}, got {told}; at most {allowed} are allowed; {cure(needed)}")
+        shown = str(count) if count < _MOST_COUNTED else "more than 1e15"
+        needed = min(count, _MOST_COUNTED) / allowed
+        raise refuse(f"too many {what}, got {shown}; at most {allowed} are allowed; {cure(needed)}")
 
 
 def processor(size: int) -> float:

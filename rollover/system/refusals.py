@@ -45,7 +45,7 @@ def refused(fault: BaseException, targets: Iterable[Path]) -> Fault | None:
     return Fault(file=str(path), message=f"cannot be read: {os.strerror(fault.errno).lower()}; {_NEEDED}")
 
 
-def told(fault: OSError | MemoryError | BrokenExecutor, target: Path | None) -> str:
+def message_of(fault: OSError | MemoryError | BrokenExecutor, target: Path | None) -> str:
     """One line about a fault of the machine; `target` is what was being written, if anything."""
     place = str(target) if target is not None else "rollover"
     if isinstance(fault, MemoryError):

@@ -26,7 +26,7 @@ from rollover.diagnosis import diagnose_folder
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.forward_model import set_up
-from rollover.diagnosis.inference.weak_form import balances
+from rollover.diagnosis.inference.residual_law import balances
 from rollover.diagnosis.io import recordings_in
 from rollover.effects import effects
 from rollover.scenario import load

@@ -19,8 +19,7 @@ from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.planning.plan import usual_noise
 from rollover.diagnosis.planning.planned import Instruments, planned, showing
-from rollover.diagnosis.planning.separation import Tests
-from rollover.diagnosis.planning.strength import point_where_it_acts, strength_with
+from rollover.diagnosis.planning.separation import Tests, point_where_it_acts, strength_with
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, scenario
 

@@ -28,7 +28,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.forward_model import set_up
-from rollover.diagnosis.inference.weak_form import Balance, balances
+from rollover.diagnosis.inference.residual_law import Balance, balances
 from rollover.diagnosis.io import recordings_in
 from rollover.proof.generator import Order, make
 from rollover.proof.handover import write_case

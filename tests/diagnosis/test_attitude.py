@@ -58,7 +58,7 @@ def as_it_is(name: str) -> tuple[Dataset, np.ndarray]:
 
 @pytest.mark.parametrize("otherwise", OTHERWISE)
 @pytest.mark.parametrize("name", SCENES)
-def test_the_evidence_is_the_same(name: str, otherwise: Callable[[Recording], Recording]) -> None:
+def test_the_dataset_is_the_same(name: str, otherwise: Callable[[Recording], Recording]) -> None:
     (found, there), (expected, there_too) = dataset(name, otherwise(recorded(name))), as_it_is(name)
     assert [s.channel for s in found.signals] == [s.channel for s in expected.signals] == [*ANGLES, *QUATERNION]
     for one, other in zip(found.signals, expected.signals, strict=True):

@@ -112,7 +112,7 @@ def short(random: np.random.Generator, levels: Sequence[float], n: int = 110) ->
     return [level * random.standard_normal(n) for level in levels]
 
 
-def test_short_recordings_of_one_level_are_told_to_be_alike() -> None:
+def test_short_recordings_of_one_level_are_found_alike() -> None:
     found = [level_ratio(r, r) for r in (short(np.random.default_rng(k), (2.0,) * 4) for k in range(400))]
     assert sum(bool(np.any(sizes != 1.0)) for sizes in found) <= 1  # one in ten thousand by chance
 

@@ -27,7 +27,7 @@ def of(*effects: tuple[str, tuple[str, ...]]) -> Fitted:
 
 
 LAYER, CRUST, STIFFNESS = ("soil-layer", ("a", "b")), ("soil-crust", ("a", "b")), ("soil-stiffness", ("a",))
-BENT = ("soil-layer", ("a", "b", "width"))
+VARIANT = ("soil-layer", ("a", "b", "width"))
 
 
 @pytest.mark.parametrize(
@@ -35,9 +35,9 @@ BENT = ("soil-layer", ("a", "b", "width"))
     [
         (LAYER, LAYER, {"soil-layer": LAYER}, ["soil-layer"]),  # found beside just this layer
         # the layer is straight beside it
-        (BENT, BENT, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
-        (BENT, LAYER, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
-        (BENT, LAYER, {"soil-layer": LAYER, "soil-crust": STIFFNESS, "soil-stiffness": STIFFNESS},
+        (VARIANT, VARIANT, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
+        (VARIANT, LAYER, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
+        (VARIANT, LAYER, {"soil-layer": LAYER, "soil-crust": STIFFNESS, "soil-stiffness": STIFFNESS},
          ["soil-layer", "soil-crust", "soil-layer"]),
     ],
 )  # fmt: skip
@@ -72,7 +72,7 @@ def test_the_last_effect_is_searched_anew_beside_variants(
 
 
 @pytest.mark.parametrize(
-    ("effort", "beside", "surely", "fitted_again"),
+    ("effort", "beside", "certain", "fitted_again"),
     [
         (SETTINGS.forward.runs, ("soil-layer", ("a",)), set(), [0]),
         (SETTINGS.forward.runs, LAYER, set(), [0, 1]),
@@ -82,7 +82,7 @@ def test_the_last_effect_is_searched_anew_beside_variants(
     ],
 )
 def test_full_runs_keep_sure_effects_and_reuse_the_last_fit(
-    monkeypatch: pytest.MonkeyPatch, effort: Effort, beside: Any, surely: set[int], fitted_again: list[int]
+    monkeypatch: pytest.MonkeyPatch, effort: Effort, beside: Any, certain: set[int], fitted_again: list[int]
 ) -> None:
     """Without either 9 per sample more is left: both are needed."""
     asked: list[int] = []
@@ -93,7 +93,7 @@ def test_full_runs_keep_sure_effects_and_reuse_the_last_fit(
         return left(of(CRUST), 9.0 - k)
 
     monkeypatch.setattr(decision, "without_effect", without)
-    monkeypatch.setattr(decision, "significant_by_wald", lambda *_: surely)
+    monkeypatch.setattr(decision, "significant_by_wald", lambda *_: certain)
     base, held = left(of(beside), 8.0), left(of(("soil-layer", ("a",)), CRUST), 1.0)
     problem = cast(Any, SimpleNamespace(again=lambda f: f, effort=effort))
     assert decision.backward_elimination(problem, held, base) is held
@@ -124,7 +124,7 @@ def test_the_strongest_is_that_without_which_most_is_left(monkeypatch: pytest.Mo
     assert asked == ([(["soil-crust"], [0.3, 0.4]), (["soil-layer"], [0.1, 0.2])] if effort.is_ensemble else [])
 
 
-def test_what_is_not_needed_goes_and_the_rest_has_slopes_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_not_retained_goes_and_slopes_are_made_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     rest, again = left(of(LAYER), 1.0), left(of(LAYER), 1.0)
     monkeypatch.setattr(decision, "without_effect", lambda *_, **__: rest)
     monkeypatch.setattr(decision, "significant_by_wald", lambda *_: {0})
@@ -137,7 +137,7 @@ MASS, SPEED, RATE, DRAG = ((i, ("a",)) for i in ("mass", "impact-speed", "soil-r
 
 
 @pytest.mark.parametrize(
-    ("answers", "needless", "asked", "found"),
+    ("answers", "surplus", "asked", "found"),
     [
         # each comes back
         ([LAYER, CRUST], "", ["soil-layer", "soil-crust"], {"soil-layer", "soil-crust", "mass"}),
@@ -151,7 +151,7 @@ MASS, SPEED, RATE, DRAG = ((i, ("a",)) for i in ("mass", "impact-speed", "soil-r
     ],
 )  # fmt: skip
 def test_a_full_set_swapped_again_and_again_is_no_answer(
-    monkeypatch: pytest.MonkeyPatch, answers: list[Any], needless: str, asked: list[str], found: set[str] | None
+    monkeypatch: pytest.MonkeyPatch, answers: list[Any], surplus: str, asked: list[str], found: set[str] | None
 ) -> None:
     scored: list[str] = []
 
@@ -163,7 +163,7 @@ def test_a_full_set_swapped_again_and_again_is_no_answer(
         return Step(base=of(*kept), fitted=new, p_value=0.0, rivals=(new,))
 
     def backward_elimination(_: Any, f: Fitted, *__: Any) -> Fitted:
-        left = [(c.id, tuple(c.search)) for c in f.candidates if len(scored) < 2 or c.id != needless]
+        left = [(c.id, tuple(c.search)) for c in f.candidates if len(scored) < 2 or c.id != surplus]
         return of(*left)
 
     monkeypatch.setattr(decision, "with_first_replaced", swapped)
@@ -180,7 +180,7 @@ def test_a_full_set_swapped_again_and_again_is_no_answer(
 
 
 @pytest.mark.parametrize(
-    ("count", "p_value", "matters", "needless", "is_open"),
+    ("count", "p_value", "matters", "surplus", "is_open"),
     [
         (3, 0.2, True, False, True),
         (3, 0.01, True, False, False),  # three that are bent to much must leave more than chance leaves once in twenty
@@ -190,13 +190,13 @@ def test_a_full_set_swapped_again_and_again_is_no_answer(
     ],
 )
 def test_effects_that_will_be_refused_are_not_looked_for_anew(
-    monkeypatch: pytest.MonkeyPatch, count: int, p_value: float, matters: bool, needless: bool, is_open: bool
+    monkeypatch: pytest.MonkeyPatch, count: int, p_value: float, matters: bool, surplus: bool, is_open: bool
 ) -> None:
     held = of(LAYER, CRUST, MASS)
     fitted = of(*(LAYER, CRUST, MASS)[:count])
     monkeypatch.setattr(decision, "matters", lambda *_: matters)
     monkeypatch.setattr(decision, "is_tolerated", lambda *_: False)
-    monkeypatch.setattr(decision, "backward_elimination", lambda *_: of(LAYER, CRUST) if needless else held)
+    monkeypatch.setattr(decision, "backward_elimination", lambda *_: of(LAYER, CRUST) if surplus else held)
     problem = cast(Any, SimpleNamespace(again=lambda f: f, effort=SETTINGS.forward.drops))
     left = cast(Any, SimpleNamespace(p_value=p_value))
     assert decision.may_be_named(problem, fitted, left) == is_open

@@ -49,7 +49,7 @@ def dataset(recordings: list[tuple[str, Recording]]) -> list[Dataset]:
     return found
 
 
-def test_what_is_eased_has_the_covariance_of_noise_alone() -> None:
+def test_what_is_marginalised_has_the_covariance_of_noise() -> None:
     N = np.random.default_rng(2).normal(0.0, 3.0, (40, 3))
     values, vectors = np.linalg.eigh(np.eye(40) + N @ N.T)
     wanted = vectors @ np.diag(values**-0.5) @ vectors.T
@@ -125,7 +125,7 @@ def test_repeats_with_shifted_clocks_do_not_differ_by_jumps() -> None:
     assert [s.scatter for e in found for s in e.signals] == [0.0] * 4
 
 
-def test_recordings_of_one_condition_are_left_out_one_by_one() -> None:
+def test_recordings_of_one_condition_are_left_out_in_turn() -> None:
     found = dataset([*recorded({}, 1, speeds=(2.0,)), *recorded({}, 2, speeds=(2.0,))])
     assert condition_groups(found) == [[0, 1]]
     assert left_out(found) == [[0], [1]]
@@ -145,11 +145,11 @@ def test_what_a_tolerance_covers_is_no_mismatch() -> None:
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 def test_a_recording_says_what_it_leaves_uncertain(suffix: str, tmp_path: Path) -> None:
     _, r = recorded({}, 1, speeds=(2.0,))[0]
-    doubt = {"initiation.speed": 0.05, "initiation.velocity": (0.1, 0.2, 0.3)}
-    told = replace(r, uncertainty=doubt, clock=Clock(zero="unknown", within=0.004))
+    uncertain = {"initiation.speed": 0.05, "initiation.velocity": (0.1, 0.2, 0.3)}
+    told = replace(r, uncertainty=uncertain, clock=Clock(zero="unknown", within=0.004))
     write_recording(told, tmp_path / f"one{suffix}")
     again = read_recording(tmp_path / f"one{suffix}")
-    assert again.uncertainty == doubt
+    assert again.uncertainty == uncertain
     assert again.clock == told.clock
     e = dataset_of("one", again, simulator_of(scenario(), again))
     assert e is not None
@@ -170,7 +170,7 @@ def test_an_uncertainty_that_is_none_is_refused_in_one_line(given: str, tmp_path
     assert fault.message.startswith("not one standard deviation, got ")
 
 
-def test_a_doubt_acts_beside_what_was_found_as_it_does_there() -> None:
+def test_an_uncertain_condition_acts_beside_what_was_found() -> None:
     """A spring of 7000 N/m behind a nose whose water weighs 18/15 of what is told, give or take 3/15.
 
     On the rigid body as told the water makes a spike, beside the spring it makes a frequency: eased of the spike alone,
@@ -216,11 +216,11 @@ def test_pulls_are_means_of_a_linear_model() -> None:
     column = np.array([[3.0], [0.0]])
     for k in (1.0, 5.0):
         assert pulls(column, np.array([6.0, 1.0]), k) == pytest.approx([18.0 / (9.0 + k)], rel=1e-12)
-    freed = marginalised(column)(np.array([6.0, 1.0]))
-    assert marginalised(column).undone(freed) == pytest.approx([6.0, 1.0], rel=1e-12)
+    without_directions = marginalised(column)(np.array([6.0, 1.0]))
+    assert marginalised(column).undone(without_directions) == pytest.approx([6.0, 1.0], rel=1e-12)
 
 
-def test_shapes_are_looked_for_where_they_have_a_part() -> None:
+def test_shapes_are_sought_where_they_have_a_part() -> None:
     """Growth dies out behind a cone's base; a ball's drag has its crisis at Reynolds numbers of 1e5 to 4e5."""
 
     def shapes(name: str, r: Recording, effect: str) -> dict[str, tuple[float, float]]:

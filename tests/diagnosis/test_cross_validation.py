@@ -13,16 +13,16 @@ import pytest
 
 from rollover.diagnosis.fit.cross_validation import cross_validated_by_refits, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.step import Inquiry
+from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.tasks import serial_map
 from rollover.diagnosis.selection.forward_step import _refitted_where_slopes_mislead
 from tests.diagnosis.drops import FORCE, recorded
-from tests.diagnosis.test_fits import GAIN, candidate, judge_of
+from tests.diagnosis.test_fits import GAIN, candidate, problem_of
 
 
 def test_held_out_data_are_predicted_by_refits_if_nonlinear() -> None:
     """Slopes a hundred times too flat send the fit without a recording far off: by 0.01 J'w/(0.01 |J|)^2."""
-    problem = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
+    problem = problem_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
     fitted = problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
     assert fitted is not None
     groups = [[0], [1], [2]]
@@ -42,9 +42,9 @@ def test_held_out_data_are_predicted_by_refits_if_nonlinear() -> None:
     assert held_out(again, groups).total == pytest.approx(ahead, rel=0.01)
 
 
-def test_the_best_fit_is_cross_validated_by_refits_in_doubt() -> None:
+def test_the_best_fit_is_cross_validated_by_refits_if_unsure() -> None:
     """Of a threshold slopes may foretell less than a fit does, and no less than 1.2 times what it leaves."""
-    problem = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
+    problem = problem_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
     fitted = problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
     assert fitted is not None
     groups, ahead = [[0], [1], [2]], held_out(fitted, [[0], [1], [2]]).chi2.sum()
@@ -59,9 +59,9 @@ def test_the_best_fit_is_cross_validated_by_refits_in_doubt() -> None:
     assert held_out(rival, groups).chi2.sum() < held_out(lead, groups).chi2.sum() < 1.2**2 * lead.chi2
     asked: list[Any] = []
 
-    def parallel_map(problem: Problem, look: Any, things: Sequence[Any]) -> list[Any]:
+    def parallel_map(problem: Problem, scan: Any, things: Sequence[Any]) -> list[Any]:
         asked.append(list(things))
-        return serial_map(problem, pickle.loads(pickle.dumps(look)), things)  # as it is sent to children
+        return serial_map(problem, pickle.loads(pickle.dumps(scan)), things)  # as it is sent to children
 
     inquiry = cast(
         Inquiry, SimpleNamespace(problem=problem, groups=groups, executor=SimpleNamespace(parallel_map=parallel_map))
@@ -72,3 +72,24 @@ def test_the_best_fit_is_cross_validated_by_refits_in_doubt() -> None:
     assert held_out(new, groups).chi2.sum() == pytest.approx(ahead, rel=0.01)
     assert asked == [groups]
     assert _refitted_where_slopes_mislead(inquiry, [fitted, rival])[0] is fitted  # it foretells best as it is
+
+
+def test_a_rival_is_not_dismissed_by_misleading_slopes() -> None:
+    """One that meets all recordings as well as the best is predicted by fits, one that explains nothing is not."""
+    problem = problem_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
+    base, best = problem.fit((), ()), problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
+    assert base is not None
+    assert best is not None
+    groups = [[0], [1], [2]]
+    pulled = [b.residual + 3.0 * b.J[:, 0] / np.linalg.norm(b.J) for b in best.blocks[1:]]
+    misled = [replace(b, J=0.01 * b.J, residual=w) for b, w in zip(best.blocks[1:], pulled, strict=True)]
+    flat = replace(best, blocks=(best.blocks[0], *misled))
+    idle = replace(
+        flat, blocks=tuple(replace(b, residual=o.residual) for b, o in zip(flat.blocks, base.blocks, strict=True))
+    )
+    assert held_out(flat, groups).total > 1.2 * float(np.sqrt(flat.chi2 / sum(b.size for b in flat.blocks)))
+    step = Step(base=base, fitted=best, p_value=0.0, rivals=(best, flat, idle)).cross_validated(problem, groups)
+    ahead, rival, other = step.rivals
+    assert ahead is step.fitted is best
+    assert held_out(rival, groups).total == pytest.approx(held_out(best, groups).total, rel=0.01)
+    assert other is idle

@@ -32,7 +32,7 @@ from rollover.diagnosis.inference.newmark import newmark_response
 from rollover.diagnosis.inference.residual_force import channels_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.spectral_lines import lines, without
-from rollover.diagnosis.selection.flexibility import is_flexible_soil, is_over_flexible
+from rollover.diagnosis.selection.simplification import is_flexible_soil, is_over_flexible
 from rollover.effects import Search
 from rollover.proof.generator import Order, make
 from rollover.recording import Clock, Recording
@@ -139,7 +139,7 @@ def test_loading_starts_at_onset_where_shifts_absorbed_it(
     assert worst() > 3.0
 
 
-def test_a_sensor_dropout_is_told_from_a_force_by_its_timing() -> None:
+def test_a_sensor_dropout_differs_from_a_force_by_its_timing() -> None:
     rng, made = np.random.default_rng(3), []
     for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
         y = r.channels[drops.FORCE].copy()
@@ -162,9 +162,9 @@ def test_a_deviating_channel_is_found_by_the_others_residuals() -> None:
     rng, curved, loose = np.random.default_rng(3), [], []
     for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
         x = r.channels[drops.FORCE]
-        bent = x * (1.0 + 0.3 * x / x.max())
+        curved = x * (1.0 + 0.3 * x / x.max())
         gone = np.where(np.repeat(rng.random(x.size // 5 + 1) < 0.1, 5)[: x.size], 0.0, x)
-        curved.append((name, replace(r, channels={**r.channels, drops.FORCE: bent})))
+        curved.append((name, replace(r, channels={**r.channels, drops.FORCE: curved})))
         loose.append((name, replace(r, channels={**r.channels, drops.FORCE: gone})))
     for made, on in ((curved, VALUE), (loose, TIME)):
         found = of_one(made)
@@ -234,7 +234,7 @@ def test_offsets_are_no_autocorrelation_of_the_noise() -> None:
             assert (after[0].signals[0] is dataset[0].signals[0]) == kept
 
 
-def test_a_hum_of_any_frequency_is_a_mismatch_of_its_channel() -> None:
+def test_a_line_of_any_frequency_is_a_mismatch_of_its_channel() -> None:
     """At 130 Hz it is beyond the slow waves of every phase."""
     made = []
     for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
@@ -265,9 +265,9 @@ def test_three_effects_of_one_kind_are_over_flexible_two_not() -> None:
     assert not is_over_flexible([*soil[:2], back[0]])
     shaped = replace(soil[1], search={"per_decade": Search(0.01, 0.5), "reference_speed": Search(0.01, 1.0)})
     assert not is_over_flexible([soil[0], shaped])
-    bent = [replace(soil[0], variant={"onset": 1.0}), shaped]
-    assert is_over_flexible(bent)
-    assert is_over_flexible([*bent, on("sensor-clipping", drops.FORCE)])
+    curved = [replace(soil[0], variant={"onset": 1.0}), shaped]
+    assert is_over_flexible(curved)
+    assert is_over_flexible([*curved, on("sensor-clipping", drops.FORCE)])
     assert not is_over_flexible([shaped])
     assert is_flexible_soil([soil[0], shaped])
     assert not is_flexible_soil(soil)

@@ -34,7 +34,7 @@ from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
 
 
-def bent(
+def curved(
     share: float, seed: int = 0, noise: float = 0.003, changes: dict[str, float] | None = None
 ) -> list[tuple[str, Recording]]:
     """Drops with a slow wave after the contact, of `share` of each channel's range (rms), other in each by some."""
@@ -83,7 +83,7 @@ def test_a_scale_lies_between_the_residual_and_the_usual() -> None:
 
 
 def test_what_is_left_beyond_noise_is_the_wave_that_was_added() -> None:
-    problem = judged(bent(0.02))
+    problem = judged(curved(0.02))
     base = problem.fit((), ())
     assert base is not None
     left = residual_rms(problem, base)
@@ -95,7 +95,7 @@ def test_what_is_left_beyond_noise_is_the_wave_that_was_added() -> None:
 
 
 def test_a_wave_of_the_estimated_scale_is_no_mismatch() -> None:
-    problem = judged(bent(0.02))
+    problem = judged(curved(0.02))
     base = problem.fit((), ())
     assert base is not None
     phases = [((-1.0, "all"),)] * 3
@@ -103,14 +103,14 @@ def test_a_wave_of_the_estimated_scale_is_no_mismatch() -> None:
     learned = estimated(problem, base, [])
     assert all(0.012 < s < 0.03 for s in learned.scales.values())
     for share, holds in ((0.02, True), (0.1, False)):
-        beside_it = judged(bent(share), dict(learned.scales))
+        beside_it = judged(curved(share), dict(learned.scales))
         base = beside_it.fit((), ())
         assert base is not None
         assert is_tolerated(beside_it, base) is holds
 
 
 def test_an_error_of_half_a_wave_is_one_for_as_long() -> None:
-    problem = judged(bent(0.05))
+    problem = judged(curved(0.05))
     base = problem.fit((), ())
     assert base is not None
     times = correlation_times(problem, base)
@@ -134,7 +134,7 @@ def test_a_ringing_alike_in_all_drops_is_no_background(turn: float, repeats: boo
 
 
 def test_a_slow_wave_alike_in_all_drops_may_be_a_background() -> None:
-    problem = judged(bent(0.02))
+    problem = judged(curved(0.02))
     base = problem.fit((), ())
     assert base is not None
     assert quick_channels(problem, base) == set()
@@ -145,7 +145,7 @@ def test_a_slow_wave_alike_in_all_drops_may_be_a_background() -> None:
 
 
 def test_references_teach_the_scale_unless_noise_hides_it() -> None:
-    problem = judged(bent(0.02))
+    problem = judged(curved(0.02))
     base = problem.fit((), ())
     assert base is not None
     learned = learned_from_references(problem, base)
@@ -181,7 +181,7 @@ def test_a_discrepancy_is_of_its_channel_and_above_the_noise() -> None:
 
 
 def test_a_slow_wave_alone_is_usual_model_error() -> None:
-    found = diagnose(scenario(), bent(0.012), estimate=True)
+    found = diagnose(scenario(), curved(0.012), estimate=True)
     assert (found.verdict, found.answer, found.effects, found.broken) == ("no-mismatch", "nothing", (), ())
     assert "models usually miss" in found.sentence
     scale = json_of(found)["discrepancy"][FORCE]
@@ -192,7 +192,7 @@ def test_a_slow_wave_alone_is_usual_model_error() -> None:
 
 def test_an_effect_is_named_beside_a_slow_wave() -> None:
     layer = {"effects.soil-layer.depth": 0.1, "effects.soil-layer.stiffness_ratio": 1.8}
-    found = diagnose(scenario(), bent(0.01, changes=layer), estimate=True)
+    found = diagnose(scenario(), curved(0.01, changes=layer), estimate=True)
     assert [e.id for e in found.effects] == ["soil-layer"]
     assert (found.verdict, found.broken) == ("missing-physics", ())
     assert found.answer in ("whole", "likeness")

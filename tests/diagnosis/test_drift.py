@@ -113,7 +113,7 @@ def test_one_offset_is_shared_by_recordings_of_unlike_noise() -> None:
     assert share(make) == 0.0
 
 
-def test_two_recordings_or_a_short_approach_show_no_drift() -> None:
+def test_two_recordings_or_a_short_free_fall_show_no_drift() -> None:
     rng = np.random.default_rng(2)
     every = signals_of([pink(rng) for _ in range(6)], 0.6)
     assert is_recorder_noise(every)

@@ -142,7 +142,7 @@ def test_p_values_are_uniform_where_runs_scatter() -> None:
     assert min(found) > 1e-3
 
 
-def test_without_neighbours_all_is_as_it_was() -> None:
+def test_without_perturbed_runs_all_is_as_it_was() -> None:
     e = dataset(np.zeros(N))
     assert with_sample_weights(e, []) is e
     assert with_sample_weights(e, [{CHANNEL: np.zeros(N)}]).signals[0].weight is None
@@ -185,7 +185,7 @@ def misfit(e: Dataset, factors: list[float], seed: int = 7) -> np.ndarray:
     return np.concatenate([rng.standard_normal(N) * np.where(after, WEIGHT * f, 1.0) for f in factors])
 
 
-def test_another_course_counts_as_one_state_of_unknown_size() -> None:
+def test_a_diverged_run_counts_as_one_state_of_unknown_size() -> None:
     e = blown()
     w = misfit(e, [6.0] * 4)
     found = heavy_tail(e, w)
@@ -202,7 +202,7 @@ def test_another_course_counts_as_one_state_of_unknown_size() -> None:
     assert has_diverged(found)
 
 
-def test_no_more_is_forgiven_than_there_is() -> None:
+def test_no_more_is_weighted_down_than_there_is() -> None:
     """The middle channel leaves more than all on the average: what counts is E + d ln(1 + x/d), and never less."""
     e = blown((*CHANNELS, "chassis/angular_velocity_y"))
     w = misfit(e, [6.0, 6.0, 6.0, 0.3, 0.3])
@@ -251,21 +251,21 @@ def test_gain_along_a_line_is_the_fall_of_the_robust_misfit(fall: float) -> None
     assert gained(np.array([fall]), 1.0) == fall
 
 
-def test_a_course_like_the_neighbours_counts_in_full() -> None:
+def test_a_run_like_the_perturbed_ones_counts_in_full() -> None:
     e = blown()
     found = heavy_tail(e, misfit(e, [0.7] * 4))
     assert found is None
     assert not has_diverged(found)
 
 
-def test_what_one_channel_leaves_alone_is_not_forgiven() -> None:
+def test_what_one_channel_leaves_alone_counts_in_full() -> None:
     e = blown()
     assert heavy_tail(e, misfit(e, [20.0, 0.9, 0.9, 0.9])) is None
     few = blown(CHANNELS[:2])
     assert heavy_tail(few, misfit(few, [20.0, 20.0])) is None
 
 
-def test_what_begins_after_its_blow_is_not_forgiven() -> None:
+def test_what_begins_after_its_impact_counts_in_full() -> None:
     """A clock that is late by more than a fall takes: nothing shows that it came to the impact as its run did."""
     e = blown()
     w = misfit(e, [8.0] * len(CHANNELS))
@@ -273,7 +273,7 @@ def test_what_begins_after_its_blow_is_not_forgiven() -> None:
     assert heavy_tail(replace(e, first_impact=float(e.recording.time[0])), w) is None
 
 
-def test_p_values_are_uniform_where_another_course_is_forgiven() -> None:
+def test_p_values_are_uniform_where_divergence_counts_less() -> None:
     """Four waves in each of four channels, of recordings and neighbours of one law.
 
     What counts less in a recording that goes a little further than expected must count less in what it is held against;
@@ -316,7 +316,7 @@ def no_jacobian() -> Dataset:
     return replace(e, signals=tuple(replace(s, weight=None) for s in e.signals))
 
 
-def test_a_neighbour_is_weighed_by_the_others() -> None:
+def test_a_perturbed_run_is_weighted_by_the_others() -> None:
     t, plain = STEP * np.arange(N), no_jacobian()
     late = np.where(t > IMPACT, np.sin(40.0 * t), 0.0)
     perturbed = [dict.fromkeys(CHANNELS, a * late) for a in (0.3, -0.5, 0.9)]
@@ -330,7 +330,7 @@ def test_a_neighbour_is_weighed_by_the_others() -> None:
     assert leave_one_out_scatter(plain).shape == (0, plain.count)
 
 
-def test_a_neighbour_counts_as_a_recording_that_goes_like_it() -> None:
+def test_a_perturbed_run_counts_as_a_recording_like_it() -> None:
     e = blown()
     noise = np.concatenate([s.weight for s in e.signals if s.weight is not None])
     perturbed = np.stack([misfit(e, [f] * 4, seed=k) for k, f in enumerate((0.1, 3.0, 6.0))])
@@ -344,7 +344,7 @@ def test_a_neighbour_counts_as_a_recording_that_goes_like_it() -> None:
     assert found[2] < 0.1
 
 
-def of_courses(others: int) -> float:
+def of_trajectories(others: int) -> float:
     """p-value of "nothing but noise" of four recordings, some of which took another course."""
     blocks = []
     for k in range(4):
@@ -362,15 +362,15 @@ def of_courses(others: int) -> float:
 
 
 def test_one_recording_may_diverge_but_not_all_of_them() -> None:
-    assert of_courses(0) > 0.05
-    assert of_courses(1) > 0.05
-    assert of_courses(1) != pytest.approx(
+    assert of_trajectories(0) > 0.05
+    assert of_trajectories(1) > 0.05
+    assert of_trajectories(1) != pytest.approx(
         p_value_of_divergence(1, 4)
     )  # so few tell nothing: a p-value of whole numbers is none
-    assert of_courses(4) < 1e-3
+    assert of_trajectories(4) < 1e-3
 
 
-def test_a_neighbour_on_another_course_is_none() -> None:
+def test_a_perturbed_run_on_another_trajectory_is_none() -> None:
     e = dataset(np.zeros(N))
     t = e.recording.time
     late = np.where(t > 0.6, np.sin(40.0 * t), 0.0)

@@ -21,13 +21,15 @@ from tests.diagnosis.test_slopes import CHANNEL, MASS, SLOPE, TIME, Scattering, 
 def test_a_model_far_from_the_ensemble_mean_takes_more_steps() -> None:
     """y = 20 x^2 sin(30 t) measured at x = 0.6, begun at 0.2: no step is longer than 0.15 of a coordinate."""
 
-    class Bent(Scattering):
+    class Curved(Scattering):
         def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
             x, k = float(changes.get("effects.slope.angle", 0.0)), round(changes.get("neighbour", 0))
             chance = np.random.default_rng([k, round(1e9 * x)]).standard_normal(TIME.size)
             return {CHANNEL: 20.0 * x**2 * np.sin(30.0 * (TIME - shift)) + 0.05 * chance}
 
-    problem = Problem([dataset(Bent().predict({"effects.slope.angle": 0.6}, 0.0)[CHANNEL], Bent()) for _ in range(2)])
+    problem = Problem(
+        [dataset(Curved().predict({"effects.slope.angle": 0.6}, 0.0)[CHANNEL], Curved()) for _ in range(2)]
+    )
     base, far = problem.fit((), ()), problem.fit((SLOPE,), (0.2,), rounds=0)
     assert base is not None
     assert far is not None

@@ -155,7 +155,7 @@ def test_a_sure_mismatch_is_searched_though_slopes_scatter(
 
 
 @pytest.mark.parametrize(("others", "in_full"), [(0, False), (1, False), (2, False), (3, True), (4, True)])
-def test_what_all_recordings_do_after_a_blow_is_no_chance(others: int, in_full: bool) -> None:
+def test_what_all_recordings_do_after_an_impact_is_no_chance(others: int, in_full: bool) -> None:
     """Of four that may each take another course in 15 % of cases: three or more do in 1.2 %, two or more in 11 %."""
     far = HeavyTail(samples=np.full(N, 0.1), share=0.2, more=1.0)
     no_jacobian = ResidualBlock(residual=np.ones(N), J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1.0)
@@ -173,7 +173,7 @@ def test_what_all_recordings_do_after_a_blow_is_no_chance(others: int, in_full: 
     assert sum(b.heavy_tail is not None for b in held.blocks) == (0 if in_full else others)
 
 
-def test_with_what_leads_its_kin_gets_a_first_fit() -> None:
+def test_with_what_leads_its_family_gets_a_first_fit() -> None:
     """Six of the ground, three sensors; the last one of the ground is akin to the best one."""
     kinds = [("a", "depth"), ("b", "x"), ("c", "y"), ("d", "z"), ("e", "u"), ("f", "depth")]
     two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
@@ -201,7 +201,7 @@ def test_what_admits_a_step_speaks_for_its_best(monkeypatch: pytest.MonkeyPatch,
     In a step that another one led it is none of the rivals.
     """
     seen: list[int] = []
-    monkeypatch.setattr(stepwise, "ensemble_validated", lambda _judge, found, _groups: seen.append(len(found.rivals)))
+    monkeypatch.setattr(stepwise, "ensemble_validated", lambda _problem, found, _groups: seen.append(len(found.rivals)))
     null = np.sort(np.random.default_rng(0).standard_normal((4000, 10)).max(axis=1) ** 2)
     score = float(np.quantile(null, 1.0 - (0.06 if p > 0.005 or not kept else p)))
     one = Fitted(candidates=(candidate("slope", "physics", "a"),), x=(0.5,), blocks=())
@@ -228,7 +228,7 @@ def test_a_rival_that_nothing_spoke_for_is_none() -> None:
     assert without_unsupported_rivals(others, scored).rivals == tuple(same_family)
 
 
-def test_what_shows_before_the_blow_alone_lasts() -> None:
+def test_a_gain_before_the_impact_alone_is_validated() -> None:
     """An effect that is sure while a body tips, and runs that go elsewhere after the impact."""
     rng = np.random.default_rng(3)
     every = [replace(dataset(r, 0.1), first_impact=TIME[N // 2]) for r in range(4)]
@@ -251,9 +251,9 @@ def test_a_base_is_begun_where_its_rivals_are() -> None:
     """A base whose clock was bent far off, and leaves more there than where the clock says."""
     rng = np.random.default_rng(5)
     problem = Problem([dataset(0, 0.0, 0.1 * rng.standard_normal(N))])
-    bent = problem.block(0, (), (), 3.0 * problem.dataset[0].shift_prior, problem.effort.fine)
-    assert bent is not None
-    base = Fitted(candidates=(), x=(), blocks=(bent,))
+    curved = problem.block(0, (), (), 3.0 * problem.dataset[0].shift_prior, problem.effort.fine)
+    assert curved is not None
+    base = Fitted(candidates=(), x=(), blocks=(curved,))
     assert restarted_base(problem, base).blocks[0].shift == 0.0
     assert with_shifts_near_prior(problem, base).blocks[0].shift == problem.dataset[0].shift_prior
     good = restarted_base(problem, base)
@@ -312,7 +312,7 @@ def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyP
     assert len(found.rivals) == 2
 
 
-def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_strength_whose_interval_holds_null_is_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, asked = Problem([dataset(0, 0.1, np.zeros(N))]), list[Any]()
     layer = replace(
         candidate("soil-layer", "physics", "depth"),
@@ -348,7 +348,7 @@ def _from(low: float, high: float) -> Interval:
     ("heavy_tailed", "others", "lasts"),
     [(True, 1, True), (True, 2, True), (True, 2, False), (False, 0, True), (False, 0, False)],
 )
-def test_other_courses_are_counted_otherwise_where_nothing_lasts(
+def test_diverged_runs_count_otherwise_where_no_gain_is_valid(
     heavy_tailed: bool, others: int, lasts: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One may be chance's; of two it is asked what could have sent them there, and they are forgiven if nothing has.

@@ -33,7 +33,7 @@ LAYER = {"effects.soil-layer.depth": 0.08, "effects.soil-layer.stiffness_ratio":
 GAIN = {"effects.sensor-gain.channel": FORCE, "effects.sensor-gain.gain": 1.05}
 
 
-def judge_of(recordings: Sequence[Any]) -> Problem:
+def problem_of(recordings: Sequence[Any]) -> Problem:
     found = [dataset_of(name, *simulated(scenario(), r)) for name, r in recordings]
     return Problem([e for e in found if e is not None])
 
@@ -42,8 +42,8 @@ def candidate(problem: Problem, key: str) -> Candidate:
     return next(c for c in candidates_of(problem.dataset, (), "drop") if c.key == key)
 
 
-def test_a_leap_is_forgiven_within_a_sample_and_not_beyond() -> None:
-    problem = judge_of(recorded({}, speeds=(2.0,), noise=1e-3))
+def test_a_jump_is_masked_within_a_sample_and_not_beyond() -> None:
+    problem = problem_of(recorded({}, speeds=(2.0,), noise=1e-3))
     e = problem.dataset[0]
     signal, part = next((s, p) for s, p in e.spans() if s.channel == DEPTH)
     raw = np.concatenate([s.values for s in e.signals])
@@ -79,14 +79,14 @@ def test_about_a_jump_lie_the_samples_that_it_may_fall_to() -> None:
 
 def test_a_second_contact_is_masked_at_any_time_shift() -> None:
     """Its force jumps by a third of the peak between two samples whose steps are as large: no two of them show it."""
-    ringing = {
+    oscillation = {
         "effects.structural-compliance.stiffness": 1.54e6,
         "effects.structural-compliance.damping": 78.0,
         "effects.structural-compliance.nose_share": 0.074,
     }
-    problem = judge_of(recorded(ringing, speeds=(2.0,), noise=3e-3, rate=900.0))
+    problem = problem_of(recorded(oscillation, speeds=(2.0,), noise=3e-3, rate=900.0))
     c = candidate(problem, "structural-compliance").whole()
-    x = tuple(coordinate(ringing[f"effects.{c.id}.{p}"], s) for p, s in c.search.items())
+    x = tuple(coordinate(oscillation[f"effects.{c.id}.{p}"], s) for p, s in c.search.items())
     shifts = problem.shifts[0] + np.arange(-1.0e-3, 1.0e-3, 5e-5)
     blocks = [problem.block(0, (c,), x, float(s), 0.0) for s in shifts]
     left = np.array([b.total for b in blocks if b is not None])
@@ -94,7 +94,7 @@ def test_a_second_contact_is_masked_at_any_time_shift() -> None:
 
 
 def test_a_clock_goes_less_far_where_all_of_its_way_leaves_more() -> None:
-    problem = judge_of(recorded({}, speeds=(2.0,), noise=3e-3))
+    problem = problem_of(recorded({}, speeds=(2.0,), noise=3e-3))
     before = problem.block(0, (), (), problem.shifts[0], 0.0)
     assert before is not None
     far, near = (problem.block(0, (), (), before.shift + d, 0.0) for d in (8e-3, 1e-6))
@@ -106,7 +106,7 @@ def test_a_clock_goes_less_far_where_all_of_its_way_leaves_more() -> None:
 
 
 def test_a_linearised_residual_knows_its_robust_weight() -> None:
-    problem = judge_of(recorded({}, speeds=(2.0,), noise=1e-3))
+    problem = problem_of(recorded({}, speeds=(2.0,), noise=1e-3))
     for heavy_tailed in (True, False):
         problem.heavy_tailed = heavy_tailed
         found = problem.block(0, (), (), 0.0, problem.effort.fine)
@@ -124,7 +124,7 @@ def test_time_shifts_stay_where_their_clock_can_be(late: float) -> None:
 
 
 def test_a_stiffness_far_off_is_found_from_every_start() -> None:
-    problem = judge_of(recorded({"effects.soil-stiffness.scale": 1.4}, speeds=(1.2, 3.2), noise=5e-3))
+    problem = problem_of(recorded({"effects.soil-stiffness.scale": 1.4}, speeds=(1.2, 3.2), noise=5e-3))
     c = candidate(problem, "soil-stiffness")
     for start in c.starts():
         fitted = problem.fit((c,), start)
@@ -135,8 +135,8 @@ def test_a_stiffness_far_off_is_found_from_every_start() -> None:
 def test_a_first_fit_ends_alike_with_and_without_jacobian() -> None:
     """Central or not, each slope at its end is a simulation of each recording."""
     recordings = recorded({"effects.soil-stiffness.scale": 1.4}, speeds=(1.2, 3.2), noise=5e-3)
-    c = candidate(judge_of(recordings), "soil-stiffness")
-    whole, first = judge_of(recordings), judge_of(recordings)
+    c = candidate(problem_of(recordings), "soil-stiffness")
+    whole, first = problem_of(recordings), problem_of(recordings)
     a = whole.fit((c,), c.starts()[0], rounds=2, shifts=(0.0, 0.0))
     b = work(first, Task(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=2))
     assert a is not None
@@ -153,22 +153,22 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
     recordings = recorded(GAIN, speeds=(1.2, 3.2))
     tasks = []
     for key in (f"sensor-gain:{FORCE}", "soil-stiffness"):
-        c = candidate(judge_of(recordings), key)
+        c = candidate(problem_of(recordings), key)
         tasks.append(Task(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=3))
-    alone = Executor().fits(judge_of(recordings), tasks)
-    look = partial(_best_middle, beside=(), shifts=(0.0, 0.0), most=math.inf)
+    alone = Executor().fits(problem_of(recordings), tasks)
+    scan = partial(_best_middle, beside=(), shifts=(0.0, 0.0), most=math.inf)
     things = [(task.candidates[0], task.candidates[0].starts()) for task in (*tasks, tasks[0])]
-    seen = Executor().parallel_map(judge_of(recordings), look, things)
+    seen = Executor().parallel_map(problem_of(recordings), scan, things)
     with Executor(workers) as many:
-        assert many.fits(judge_of(recordings), tasks)[0] is not None  # in this process: none has begun
+        assert many.fits(problem_of(recordings), tasks)[0] is not None  # in this process: none has begun
         assert many.children._pool is None
     with Executor(workers) as many:
-        many.begin(judge_of(recordings))
+        many.begin(problem_of(recordings))
         while not many.is_there():
             time.sleep(0.1)
-        problem = judge_of(recordings)
+        problem = problem_of(recordings)
         together = many.fits(problem, tasks)
-        assert many.parallel_map(problem, look, things) == seen
+        assert many.parallel_map(problem, scan, things) == seen
         assert many.each(math.factorial, range(9)) == [math.factorial(k) for k in range(9)]
         assert not problem._raw  # nothing was simulated here
         assert many.children._pool is not None
@@ -184,24 +184,24 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
 
 def test_what_was_fitted_is_taken_up_again(tmp_path: Path) -> None:
     recordings = recorded(GAIN, speeds=(1.2, 3.2))
-    problem = judge_of(recordings)
+    problem = problem_of(recordings)
     c = candidate(problem, f"sensor-gain:{FORCE}")
     task = Task(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0))
     notebook = tmp_path / "fits"
     first = Executor(notebook=notebook).fits(problem, [task])[0]
     with notebook.open("a") as file:
         file.write('{"key": "broken off he')
-    other = judge_of(recordings)
-    other_crew = Executor(notebook=notebook)
-    again = other_crew.fits(other, [task])[0]
+    other = problem_of(recordings)
+    other_executor = Executor(notebook=notebook)
+    again = other_executor.fits(other, [task])[0]
     assert first is not None
     assert again is not None
     assert again.x == first.x
     assert again.chi2 == pytest.approx(first.chi2, rel=1e-12)
     assert other.simulations < problem.simulations
-    assert Executor(notebook=notebook, about="another scenario")._done.keys() == other_crew._done.keys()
-    assert task.key("another") not in other_crew._done
-    other_crew.close()
+    assert Executor(notebook=notebook, about="another scenario")._done.keys() == other_executor._done.keys()
+    assert task.key("another") not in other_executor._done
+    other_executor.close()
     assert not notebook.exists()
 
 
@@ -281,12 +281,12 @@ def test_the_form_of_an_effect_is_found_with_it(id: str, hidden: dict[str, Any],
 def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> None:
     """A power has two numbers where a logarithm has one: what was fitted is told by its form, not by how many."""
     power = {"effects.soil-rate-hardening." + n: v for n, v in (("per_decade", 0.0), ("power", 0.3))}
-    problem = judge_of(recorded(power, 13, speeds=(1.2, 2.4, 3.4), noise=0.002))
+    problem = problem_of(recorded(power, 13, speeds=(1.2, 2.4, 3.4), noise=0.002))
     rate = candidate(problem, "soil-rate-hardening")
     begun = problem.fit((rate,), (0.5,))
     assert begun is not None
     shifts, variant = tuple(b.shift for b in begun.blocks), rate.variants()[0]
-    task = Task(how="shape", candidates=(rate,), start=begun.x, shifts=shifts, variant=variant)
+    task = Task(how="secondary", candidates=(rate,), start=begun.x, shifts=shifts, variant=variant)
     found = []
     for _ in range(2):
         with Executor(notebook=tmp_path / "notes") as one:
@@ -307,7 +307,7 @@ def test_far_from_noise_a_fit_stops_at_a_small_gain(monkeypatch: pytest.MonkeyPa
 
     What is met is fitted as far as ever.
     """
-    problem = judge_of(recorded(LAYER, 3, speeds=(1.2, 2.2, 3.2)))
+    problem = problem_of(recorded(LAYER, 3, speeds=(1.2, 2.2, 3.2)))
     ends: dict[tuple[str, float], tuple[tuple[float, ...], float, int]] = {}
     for key, start in (("soil-rate-hardening", (0.5,)), ("soil-layer", (0.6, 0.6))):
         for trifling in (0.0, SETTINGS.fit.levenberg_marquardt.converged_share):
@@ -330,9 +330,9 @@ def test_far_from_noise_a_fit_stops_at_a_small_gain(monkeypatch: pytest.MonkeyPa
     assert y == pytest.approx(x, abs=1e-3)
 
 
-def test_a_strength_is_told_in_what_is_usual() -> None:
+def test_a_strength_is_stated_in_what_is_usual() -> None:
     """A gain's usual error is 3 %, an axis is turned by 0.05 rad; a threshold that nothing is null of says nothing."""
-    problem = judge_of(recorded({}, speeds=(2.0,), channels=(FORCE, ACCELERATION)))
+    problem = problem_of(recorded({}, speeds=(2.0,), channels=(FORCE, ACCELERATION)))
     cases = {
         f"sensor-gain:{ACCELERATION}": (0.97, 1.0),
         f"sensor-misalignment:{ACCELERATION}": (0.25, 5.0),
@@ -369,7 +369,7 @@ def test_one_condition_alone_says_that_nothing_was_held_out() -> None:
 
 def test_a_rebound_is_searched_from_the_laws_own_restitution() -> None:
     recordings = recorded({"effects.soil-elastic-rebound.recovery": 0.0222}, speeds=(1.5, 3.0), noise=5e-3)
-    problem = judge_of(recordings)
+    problem = problem_of(recordings)
     own = scenario().ground.law.recovery
     c = next(c for c in candidates_of(problem.dataset, (), "drop", scenario()) if c.key == "soil-elastic-rebound")
     assert c.search["recovery"].low == own > 0.0

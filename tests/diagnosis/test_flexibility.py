@@ -10,10 +10,10 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.fit.parameterisation import coordinate
 from rollover.diagnosis.selection import decision
-from rollover.diagnosis.selection.flexibility import curvature_gain, drift, is_a_curve, is_straight_line, square
+from rollover.diagnosis.selection.simplification import curvature_gain, drift, is_a_curve, is_straight_line, square
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
-from tests.diagnosis.test_fits import GAIN, candidate, judge_of
+from tests.diagnosis.test_fits import GAIN, candidate, problem_of
 
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
 SPEEDS = (1.1, 1.5, 1.9, 2.3, 2.7, 3.1)
@@ -24,15 +24,15 @@ def curved(curvature: float, seed: int, noise: float, rate: float) -> list:  # t
     made = []
     for name, r in recorded({}, seed, speeds=SPEEDS, channels=CHANNELS, noise=noise, rate=rate):
         force = r.channels[FORCE]
-        bent = force + curvature * force**2 / np.max(force)
-        made.append((name, replace(r, channels={**r.channels, FORCE: bent})))
+        curved = force + curvature * force**2 / np.max(force)
+        made.append((name, replace(r, channels={**r.channels, FORCE: curved})))
     return made
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_of_a_true_gain_nothing_curved_is_left(seed: int) -> None:
     """Chi-square of one degree of freedom: above 11 in one of a thousand."""
-    problem = judge_of(recorded(GAIN, seed, speeds=SPEEDS, noise=0.02, rate=1500.0))
+    problem = problem_of(recorded(GAIN, seed, speeds=SPEEDS, noise=0.02, rate=1500.0))
     c = candidate(problem, f"sensor-gain:{FORCE}")
     fitted = problem.fit((c,), (coordinate(1.05, c.search["gain"]),))
     assert fitted is not None
@@ -41,7 +41,7 @@ def test_of_a_true_gain_nothing_curved_is_left(seed: int) -> None:
 
 def test_a_curve_is_seen_beside_the_gain_that_meets_it_best() -> None:
     """z^2 of a least-squares fit of one column more is what the sum of squares falls by."""
-    problem = judge_of(curved(-0.08, 5, 0.02, 1500.0))
+    problem = problem_of(curved(-0.08, 5, 0.02, 1500.0))
     c = candidate(problem, f"sensor-gain:{FORCE}")
     fitted = problem.fit((c,), (coordinate(0.93, c.search["gain"]),))
     assert fitted is not None
@@ -55,7 +55,7 @@ def test_a_gain_that_changes_as_it_warms_is_none(is_ensemble: bool) -> None:
     for name, r in recorded(GAIN, 5, speeds=SPEEDS, channels=CHANNELS, noise=0.02, rate=1500.0):
         warm = 1.0 + 0.1 * (r.time > 0.1)
         made.append((name, replace(r, channels={**r.channels, FORCE: warm * r.channels[FORCE]})))
-    problem = judge_of(made)
+    problem = problem_of(made)
     problem.effort = replace(problem.effort, is_ensemble=is_ensemble)
     c = candidate(problem, f"sensor-gain:{FORCE}")
     fitted = problem.fit((c,), (coordinate(1.1, c.search["gain"]),))
@@ -65,7 +65,7 @@ def test_a_gain_that_changes_as_it_warms_is_none(is_ensemble: bool) -> None:
 
 
 def test_gain_and_offset_that_meet_a_curved_sensor_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = judge_of(curved(-0.12, 6, 0.02, 1500.0))
+    problem = problem_of(curved(-0.12, 6, 0.02, 1500.0))
     both = [candidate(problem, f"{id}:{FORCE}") for id in ("sensor-gain", "sensor-bias")]
     fitted = problem.fit(both, [coordinate(1.0, both[0].search["gain"]), coordinate(1.0, both[1].search["bias"])])
     assert fitted is not None

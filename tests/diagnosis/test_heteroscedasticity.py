@@ -16,7 +16,7 @@ from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
 from tests.diagnosis.test_ensemble import CHANNELS as CHASSIS
 from tests.diagnosis.test_ensemble import IMPACT, blown
-from tests.diagnosis.test_fits import judge_of
+from tests.diagnosis.test_fits import problem_of
 from tests.physics.scenes import shipped
 
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
@@ -36,9 +36,9 @@ def louder(recordings: list[tuple[str, Recording]], seed: int) -> list[tuple[str
     return found
 
 
-def test_its_law_is_told_from_the_samples_alone() -> None:
+def test_its_law_is_estimated_from_the_samples_alone() -> None:
     quiet = recorded({"effects.soil-crust.thickness": 0.03}, noise=0.0, rate=2000.0, channels=CHANNELS)
-    for e, (_, clean) in zip(with_variance_model(judge_of(louder(quiet, 1)).dataset), quiet, strict=True):
+    for e, (_, clean) in zip(with_variance_model(problem_of(louder(quiet, 1)).dataset), quiet, strict=True):
         for s in e.signals:
             y = clean[s.channel][s.rows]
             true = 1.0 + SHARE / FLOOR * np.abs(y) / most(quiet, s.channel)
@@ -59,7 +59,7 @@ def test_noise_alone_does_not_grow_with_itself() -> None:
         (name, replace(r, channels={**r.channels, FORCE: rng.normal(size=r.time.size)}))
         for name, r in recorded({}, noise=0.01, rate=2000.0, channels=CHANNELS)
     ]
-    assert all(s.level is None for e in with_variance_model(judge_of(made).dataset) for s in e.signals)
+    assert all(s.level is None for e in with_variance_model(problem_of(made).dataset) for s in e.signals)
 
 
 @pytest.mark.parametrize("cfc", [None, 180])
@@ -80,7 +80,7 @@ def test_an_even_noise_or_a_filter_is_not_taken_for_it(rate: float, cfc: int | N
             )
             for name, r in made
         ]
-    assert all(s.level is None for e in with_variance_model(judge_of(made).dataset) for s in e.signals)
+    assert all(s.level is None for e in with_variance_model(problem_of(made).dataset) for s in e.signals)
 
 
 def test_it_is_no_mismatch_and_hides_none() -> None:
@@ -105,7 +105,7 @@ def test_what_a_model_may_be_off_by_does_not_grow_with_the_noise() -> None:
     assert whitened(columns)[:, 1] == pytest.approx(2.0 / np.hypot(0.1 * level, 1.0), rel=1e-12)
 
 
-def test_contacts_after_a_blow_are_no_noise() -> None:
+def test_contacts_after_an_impact_are_no_noise() -> None:
     """Twice the noise of a motion after the impact, where values are large, in an overturn and in anything else."""
     rng = np.random.default_rng(3)
     e = blown(CHASSIS)

@@ -82,14 +82,14 @@ def inconsistencies(made: Drops) -> tuple[list[Inconsistency], list[Inconsistenc
 
 
 @pytest.mark.parametrize("factor", [0.6, 1.4, math.pi, 4.4482])
-def test_no_other_factor_is_a_slip(factor: float) -> None:
+def test_no_other_factor_is_a_unit_error(factor: float) -> None:
     """Of a force: 1.4 may be a gain, nobody writes forces down in 1/pi N, and pounds may be ground that is harder."""
     made = recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS)
     assert inconsistencies(mistaken(made, FORCE, factor)) == ([], [])
     assert len(inconsistencies(mistaken(made, FORCE, 9.80665))[0]) == 1
 
 
-def test_what_goes_its_own_way_is_no_slip() -> None:
+def test_what_goes_its_own_way_is_no_unit_error() -> None:
     """A channel turned round, with as much again that the simulation does not have: r = 0.7."""
     made = mistaken(recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS), FORCE, -1.0)
     other = np.roll(made[1][1][FORCE], 40) * 0.8
@@ -97,8 +97,8 @@ def test_what_goes_its_own_way_is_no_slip() -> None:
     assert inconsistencies(made) == ([], [])
 
 
-@pytest.mark.parametrize(("apart", "is_slip"), [(0.6, True), (0.8, False)])
-def test_what_neighbouring_runs_do_as_well_is_no_slip(apart: float, is_slip: bool) -> None:
+@pytest.mark.parametrize(("apart", "is_unit_error"), [(0.6, True), (0.8, False)])
+def test_what_perturbed_runs_do_as_well_is_no_unit_error(apart: float, is_unit_error: bool) -> None:
     """Runs that nobody could tell apart, by so much of a channel: 0.71 of it leave |r| = 0.7."""
     made = mistaken(recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS), FORCE, -1.0)
     every, _ = prepared(scenario(), made, Executor())
@@ -108,7 +108,7 @@ def test_what_neighbouring_runs_do_as_well_is_no_slip(apart: float, is_slip: boo
     every[1] = replace(
         every[1], simulator=SimpleNamespace(predict=every[1].simulator.predict, perturbed=lambda: perturbed)
     )
-    assert [inconsistency.signal.channel for inconsistency in find_inconsistencies(every)[0]] == [FORCE] * is_slip
+    assert [inconsistency.signal.channel for inconsistency in find_inconsistencies(every)[0]] == [FORCE] * is_unit_error
 
 
 def test_ground_three_times_as_stiff_is_no_unit_error() -> None:

@@ -21,8 +21,8 @@ from rollover.effects import EFFECTS, Search, possible
 from rollover.proof.generator import make, plan
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, recorded
-from tests.diagnosis.test_fits import candidate, judge_of
-from tests.diagnosis.test_local_search import judge_of_case
+from tests.diagnosis.test_fits import candidate, problem_of
+from tests.diagnosis.test_local_search import problem_of_case
 from tests.diagnosis.test_slopes import CHANNEL, LOAD, Late, dataset, first_impact
 
 
@@ -35,7 +35,7 @@ def fit(problem: Problem, c: Candidate) -> Fitted:
 def test_an_unfitted_exponent_widens_the_strengths_interval() -> None:
     """c v^0.9 fitted as c v: at 2 m/s, 7 % of the strength goes to the exponent, more than the noise leaves open."""
     changes = {"effects.soil-viscous-damping.damping": 60.0, "effects.soil-viscous-damping.exponent": 0.9}
-    problem = judge_of(recorded(changes, speeds=(1.0, 1.5, 2.0), noise=0.01))
+    problem = problem_of(recorded(changes, speeds=(1.0, 1.5, 2.0), noise=0.01))
     c = candidate(problem, "soil-viscous-damping")
     assert set(c.secondary) == {"exponent"}
     fitted = fit(problem, c)
@@ -47,7 +47,7 @@ def test_an_unfitted_exponent_widens_the_strengths_interval() -> None:
 
 
 @pytest.mark.parametrize("flatter", [1.0, 4.0])
-def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float) -> None:
+def test_an_interval_extends_as_far_as_the_misfit_stays_low(flatter: float) -> None:
     """Slopes say |w - J dx|^2 with J = 40, the misfit rises as if J were `flatter` times less: a parabola as wide."""
     J, n = 40.0, 50
     rng = np.random.default_rng(1)
@@ -104,7 +104,7 @@ def test_rough_misfits_give_intervals_by_nearby_points(start: float, places: int
 
 
 @pytest.mark.parametrize(("start", "reached"), [(0.5, 4.0), (0.9, 2.5), (0.99, 1.0)])
-def test_an_interval_looks_behind_the_ripples_of_a_threshold(
+def test_an_interval_goes_beyond_local_minima_of_a_threshold(
     start: float, reached: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A misfit that rises by 5 at 1 and 2 deviations and comes down to 1 between and behind them, up to 4 of 0.04.
@@ -126,8 +126,8 @@ def test_an_interval_looks_behind_the_ripples_of_a_threshold(
     assert all(np.all((x >= 0.0) & (x <= 1.0 + 1e-12)) for x in seen if x[0] <= 1.0)
 
 
-def test_profiles_look_beyond_thresholds_of_shaped_effects() -> None:
-    problem = judge_of(recorded({}, speeds=(2.0,)))
+def test_profiles_reach_beyond_thresholds_of_shaped_effects() -> None:
+    problem = problem_of(recorded({}, speeds=(2.0,)))
     layer, mass = candidate(problem, "soil-layer"), candidate(problem, "mass")
     for candidates, expected in (
         ((layer,), set()),
@@ -139,11 +139,11 @@ def test_profiles_look_beyond_thresholds_of_shaped_effects() -> None:
         assert stated._rippled(Fitted(candidates=candidates, x=x, blocks=())) == expected
 
 
-def test_an_interval_along_a_crooked_valley_holds(tmp_path: Path) -> None:
+def test_an_interval_along_a_curved_ridge_holds(tmp_path: Path) -> None:
     """Stiffness and the share of the nose make up for each other, and not along a straight line."""
     case = make(next(order for order in plan(63, 20263016, ["single"]) if order.index == 25))
     true = case.truth["effects"][0]["parameters"]
-    problem = judge_of_case(case, tmp_path)
+    problem = problem_of_case(case, tmp_path)
     c = candidate(problem, "structural-compliance").whole()
     ended = {"stiffness": 3.72118e6, "damping": 75.34, "nose_share": 0.18632}
     fitted = problem.fit((c,), [coordinate(ended[name], s) for name, s in c.search.items()], width=2)
@@ -156,7 +156,7 @@ def test_an_interval_along_a_crooked_valley_holds(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("profile_extents", "begun", "end"), [(3.0, 1.0, 3.0), (3.0, 2.0, 3.0), (3.0, 3.5, 3.5), (1.0, 1.0, 1.0)]
 )
-def test_an_interval_follows_a_crooked_valley(profile_extents: float, begun: float, end: float) -> None:
+def test_an_interval_follows_a_curved_ridge(profile_extents: float, begun: float, end: float) -> None:
     """With the others fitted anew the misfit is a parabola that rises by what is due `profile_extents` times 0.04 off.
 
     What a straight way has reached already stays reached.
@@ -246,7 +246,7 @@ def test_a_number_of_an_effect_stays_where_it_can_be() -> None:
 
 def read(recordings: list[tuple[str, Recording]]) -> Problem:
     """Recordings made ready as a diagnosis does: many samples averaged, what the recorder makes of each kept."""
-    made = judge_of(recordings).dataset
+    made = problem_of(recordings).dataset
     return Problem(with_quantisation(made, [r for _, r in recordings]))
 
 

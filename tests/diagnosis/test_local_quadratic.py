@@ -63,7 +63,7 @@ def straight(t: float, flatter: float, least: float = 0.0) -> list[Array]:
         (lambda t: None if t < -0.5 else straight(t, 5.0), 5.0, 5.0, 12),  # the range ends there: four are too few
     ],
 )
-def test_an_interval_reaches_as_far_as_the_mean_of_runs_says(
+def test_an_interval_extends_as_far_as_the_mean_of_runs_says(
     of: Callable[[float], list[Array] | None], down: float, up: float, places: int
 ) -> None:
     seen: list[float] = []
@@ -72,7 +72,7 @@ def test_an_interval_reaches_as_far_as_the_mean_of_runs_says(
 
 
 @pytest.mark.parametrize("of", [lambda t: straight(t, 1e3), lambda t: None])
-def test_what_does_not_rise_within_32_places_is_not_told(of: Callable[[float], list[Array] | None]) -> None:
+def test_what_does_not_rise_within_32_points_has_no_interval(of: Callable[[float], list[Array] | None]) -> None:
     seen: list[float] = []
     assert reach(of, seen) is None
     assert len(seen) == 20
@@ -96,8 +96,8 @@ def test_slopes_that_the_mean_of_runs_has_too_are_believed(share: float, is_look
     assert found == pytest.approx((1.0 / np.sqrt(share),) * 2 if is_looked_at else (0.0, 0.0), rel=1e-9)
 
 
-@pytest.mark.parametrize(("scatter", "is_told"), [(0.0, True), (57.0, False)])
-def test_chance_slopes_of_the_ensemble_mean_are_not_believed(scatter: float, is_told: bool) -> None:
+@pytest.mark.parametrize(("scatter", "is_estimated"), [(0.0, True), (57.0, False)])
+def test_chance_slopes_of_the_ensemble_mean_are_not_believed(scatter: float, is_estimated: bool) -> None:
     """The mean keeps all of J, |J|^2 = 1.96^2, but h_11 = 1/4260 of what runs scatter by is a fifth of that.
 
     They do to one side at half the places, 1, 4, 8, 12, 32 on either side, and to the other at the rest.
@@ -108,10 +108,10 @@ def test_chance_slopes_of_the_ensemble_mean_are_not_believed(scatter: float, is_
         to = 1.0 if abs(t) in (1.0, 4.0, 8.0, 12.0, 32.0) else -1.0
         return [-t * 1.96 * DIP + to * scatter * ACROSS]
 
-    assert reach(left) == ((0.0, 0.0) if is_told else None)
+    assert reach(left) == ((0.0, 0.0) if is_estimated else None)
 
 
-def test_samples_count_alike_at_all_places_and_no_clock_does() -> None:
+def test_samples_count_alike_at_all_points_and_no_clock_does() -> None:
     """Half the samples count 0.6 at five places and 0.3 at three: 0.6 at all. What a clock may do is nobody's.
 
     Of a slope v the late half counts 0.36: c = 0.68 |v|^2. With the clock at right angles to v, nothing changes.

@@ -19,7 +19,7 @@ from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import ended, with_time_shift_search
-from rollover.diagnosis.fit.model_variants import with_fitted_shape
+from rollover.diagnosis.fit.model_variants import with_fitted_secondary
 from rollover.diagnosis.fit.parameterisation import coordinate, coordinates
 from rollover.diagnosis.fit.step import Inquiry, Screened, Step
 from rollover.diagnosis.fit.threshold_scan import threshold_ranges, with_threshold_traced
@@ -37,13 +37,13 @@ from rollover.effects import EFFECTS
 from rollover.proof.generator import Case, make, plan
 from rollover.scenario import load
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
-from tests.diagnosis.test_fits import candidate, judge_of
+from tests.diagnosis.test_fits import candidate, problem_of
 from tests.physics.scenes import shipped
 
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
 
 
-def judge_of_case(case: Case, folder: Path) -> Problem:
+def problem_of_case(case: Case, folder: Path) -> Problem:
     path = folder / "scenario.yaml"
     path.write_text(case.scenario, encoding="utf-8")
     return Problem([dataset_of(str(k), *simulated(load(path), r)) for k, r in enumerate(case.recordings)])
@@ -54,7 +54,7 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     true = {"stiffness": 1.888e6, "damping": 1372.0}
     hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
     speeds = (1.13, 2.4, 2.8, 1.98, 1.6, 3.1)
-    problem = judge_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
+    problem = problem_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
     c = candidate(problem, "structural-compliance")
     count = sum(e.count for e in problem.dataset)
     led_astray = problem.fit((c,), (0.5625, 0.2), shifts=[0.0] * len(speeds))
@@ -75,14 +75,14 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     assert c.values(found.x)["damping"] == pytest.approx(true["damping"], rel=0.1)
 
 
-def test_a_misfitted_nose_is_found_by_its_ringing(
+def test_a_misfitted_nose_is_found_by_its_oscillation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Damped until it hardly rings, as a share of the mass that it has not: nothing leads from there to what it is."""
     true = {"stiffness": 3.619e6, "damping": 385.3, "nose_share": 0.2545}
     hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
     speeds = (1.13, 1.6, 2.4)
-    problem = judge_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
+    problem = problem_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
     c = candidate(problem, "structural-compliance")
     astray = problem.fit(
         (c,), coordinates({"stiffness": 6.4e6, "damping": 8000.0}, c.search), shifts=[0.0] * len(speeds)
@@ -106,7 +106,7 @@ def test_the_clock_of_a_channel_is_followed_against_all_others(tmp_path: Path) -
     case = make(next(order for order in plan(63, 20262911, ["single"]) if order.index == 45))
     (truth,) = case.truth["effects"]
     assert (truth["id"], truth["channel"]) == ("sensor-clock-offset", FORCE)
-    problem = judge_of_case(case, tmp_path)
+    problem = problem_of_case(case, tmp_path)
     c = candidate(problem, f"sensor-clock-offset:{FORCE}")
     begun = (coordinate(0.006138, c.search["offset"]),)
     stopped = problem.fit((c,), begun, shifts=[1.43e-4] * len(case.recordings), width=2)
@@ -119,7 +119,7 @@ def test_the_clock_of_a_channel_is_followed_against_all_others(tmp_path: Path) -
 
 
 def test_a_fit_whose_rounds_were_too_few_is_gone_on_with() -> None:
-    problem = judge_of(recorded({"effects.soil-layer.stiffness_ratio": 1.3, "effects.soil-layer.depth": 0.12}, 6))
+    problem = problem_of(recorded({"effects.soil-layer.stiffness_ratio": 1.3, "effects.soil-layer.depth": 0.12}, 6))
     c = candidate(problem, "soil-layer")
     short = problem.fit((c,), (0.62, 0.4), rounds=2)
     whole = problem.fit((c,), (0.62, 0.4), width=1)
@@ -130,17 +130,17 @@ def test_a_fit_whose_rounds_were_too_few_is_gone_on_with() -> None:
     assert ended(problem, whole).chi2 <= whole.chi2
 
 
-def test_a_nose_is_found_along_the_valley_of_its_frequency(tmp_path: Path) -> None:
+def test_a_nose_is_found_along_the_ridge_of_its_frequency(tmp_path: Path) -> None:
     """Little damping: hundreds of radians of ringing know k/(s (1 - s)) long before they know either."""
     case = make(next(order for order in plan(63, 20262913, ["single"]) if order.index == 7))
     true = case.truth["effects"][0]["parameters"]
-    problem = judge_of_case(case, tmp_path)
+    problem = problem_of_case(case, tmp_path)
     c = candidate(problem, "structural-compliance")
     share = EFFECTS[c.id].reshaped(true, "nose_share", 0.1)
     plain = problem.fit((c,), [coordinate(share[name], s) for name, s in c.search.items()])
     assert plain is not None
     assert plain.chi2 > 4.0 * sum(e.count for e in problem.dataset)
-    found = with_fitted_shape(problem, plain, [b.total for b in plain.blocks])
+    found = with_fitted_secondary(problem, plain, [b.total for b in plain.blocks])
     assert found is not None
     assert found.chi2 < 1.1 * sum(e.count for e in problem.dataset)
     assert found.candidates[-1].along == ()
@@ -157,7 +157,7 @@ def test_a_noses_share_moves_at_constant_frequency_and_damping() -> None:
     for name in ("stiffness", "damping"):
         w = [n[name] / (n["nose_share"] * (1.0 - n["nose_share"])) for n in (before, after)]
         assert w[1] == pytest.approx(w[0], rel=1e-12)
-    problem = judge_of(recorded({}, speeds=(2.0,)))
+    problem = problem_of(recorded({}, speeds=(2.0,)))
     whole = replace(candidate(problem, "structural-compliance").whole(), along=("nose_share",))
     x = (0.4, 0.5, 0.6)
     plain, there = whole.plain(x)
@@ -171,14 +171,14 @@ def test_a_noses_share_moves_at_constant_frequency_and_damping() -> None:
 def test_the_share_of_an_unweighed_nose_is_found() -> None:
     true = {"stiffness": 1e6, "damping": 500.0, "nose_share": 0.2}
     hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
-    problem = judge_of(recorded(hidden, 3, speeds=(1.2, 2.0, 2.8), channels=CHANNELS, rate=1500.0, noise=0.005))
+    problem = problem_of(recorded(hidden, 3, speeds=(1.2, 2.0, 2.8), channels=CHANNELS, rate=1500.0, noise=0.005))
     c = candidate(problem, "structural-compliance")
     count = sum(e.count for e in problem.dataset)
     begun = [coordinate(true[name], s) for name, s in c.search.items()]
     plain = problem.fit((c,), begun, shifts=[0.0] * 3)
     assert plain is not None
     assert plain.chi2 > 2.0 * count
-    found = with_fitted_shape(problem, plain, [b.total for b in plain.blocks])
+    found = with_fitted_secondary(problem, plain, [b.total for b in plain.blocks])
     assert found is not None
     assert found.chi2 < 1.1 * count
     told = found.candidates[-1].values(found.x)
@@ -192,7 +192,7 @@ def test_a_threshold_is_found_though_a_fit_ended_at_another() -> None:
     """A crust that is hardly stiffer: ends elsewhere are nearly as good, and no slope leads from one to the other."""
     true = {"thickness": 0.065, "stiffness_ratio": 1.02}
     hidden = {f"effects.soil-crust.{name}": value for name, value in true.items()}
-    problem = judge_of(recorded(hidden, 2, speeds=(1.2, 1.8, 2.4, 3.0), channels=CHANNELS, rate=1500.0, noise=0.004))
+    problem = problem_of(recorded(hidden, 2, speeds=(1.2, 1.8, 2.4, 3.0), channels=CHANNELS, rate=1500.0, noise=0.004))
     c = candidate(problem, "soil-crust")
     begun = [coordinate(v, s) for v, s in zip((0.092, 1.01), c.search.values(), strict=True)]
     ended = problem.fit((c,), begun, width=1)
@@ -210,7 +210,7 @@ def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
     case = make(next(order for order in plan(63, 20263014, ["single"]) if order.index == 1))
     (truth,) = case.truth["effects"]
     assert (truth["id"], truth["channel"]) == ("sensor-clock-drift", FORCE)
-    problem = judge_of_case(case, tmp_path)
+    problem = problem_of_case(case, tmp_path)
     c = candidate(problem, f"sensor-clock-drift:{FORCE}")
     stopped = problem.fit((c,), (coordinate(truth["parameters"]["drift"] / 6.0, c.search["drift"]),), rounds=0)
     assert stopped is not None
@@ -219,16 +219,16 @@ def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
     assert c.values(found.x)["drift"] == pytest.approx(truth["parameters"]["drift"], rel=0.02)
 
 
-def test_what_rings_is_traced_along_the_valley_of_its_frequency(tmp_path: Path) -> None:
+def test_an_oscillatory_effect_is_traced_along_its_ridge(tmp_path: Path) -> None:
     case = make(next(order for order in plan(63, 20263016, ["single"]) if order.index == 25))
-    problem = judge_of_case(case, tmp_path)
+    problem = problem_of_case(case, tmp_path)
     c = candidate(problem, "structural-compliance").whole()
     ended = {"stiffness": 3.68794e6, "damping": 75.98, "nose_share": 0.184108}
     x = [coordinate(ended[name], s) for name, s in c.search.items()]
     stopped = problem.fit((c,), x, rounds=0, shifts=[0.0] * len(case.recordings))
     assert stopped is not None
-    bent, own = c.reshaped(x)
-    assert bent.plain(own)[1] == pytest.approx(x)
+    curved, own = c.reshaped(x)
+    assert curved.plain(own)[1] == pytest.approx(x)
     assert [k for k, _, _ in threshold_ranges(stopped)] == [2, 2]
     found = min((with_threshold_traced(problem, stopped, s) for s in threshold_ranges(stopped)), key=lambda f: f.chi2)
     assert found.chi2 < stopped.chi2 - 20.0
@@ -237,7 +237,7 @@ def test_what_rings_is_traced_along_the_valley_of_its_frequency(tmp_path: Path) 
 
 
 def test_a_pair_that_leaves_nothing_is_named_by_both() -> None:
-    """A crust and a guide that rubs, recorded from full runs: these meet the crust's end a step late."""
+    """A crust and guide friction, recorded from full runs: these meet the crust's end a step late."""
     hidden = {"effects.soil-crust.thickness": 0.03, "effects.guide-friction.force": 40.0}
     made = []
     for seed, speed in enumerate((1.2, 1.5, 2.0, 2.5, 3.0, 3.4), start=1):
@@ -273,14 +273,14 @@ def test_an_abrupt_effect_is_led_by_its_smooth_shape(tmp_path: Path) -> None:
     """A crust whose end leaps past samples: a fit that is stuck far from the truth comes there, another stays."""
     case = make(plan(63, 20263301, ("single",))[43])
     [true] = [e["parameters"] for e in case.truth["effects"]]
-    problem = judge_of_case(case, tmp_path)
+    problem = problem_of_case(case, tmp_path)
     estimate_time_shifts(problem)
     c = candidate(problem, "soil-crust")
     gains = []
     for begun in ((0.8125, 0.875), (0.0625, 0.125)):
         stuck = problem.fit((c,), begun)
         assert stuck is not None
-        found = with_fitted_shape(problem, stuck, [b.total for b in stuck.blocks])
+        found = with_fitted_secondary(problem, stuck, [b.total for b in stuck.blocks])
         assert found is not None
         assert found.candidates == (c,), "its usual shape"
         gains.append(stuck.chi2 - found.chi2)
@@ -291,9 +291,9 @@ def test_an_abrupt_effect_is_led_by_its_smooth_shape(tmp_path: Path) -> None:
 
 
 def test_two_effects_without_a_first_are_tried_together() -> None:
-    """A heavier striker on a guide that rubs: a stiffness and the mass led, and friction beside the first."""
+    """A heavier striker with guide friction: a stiffness and the mass led, and friction beside the first."""
     hidden = {"effects.mass.added": 2.3, "effects.guide-friction.force": 31.0}
-    problem = judge_of(recorded(hidden, 1, speeds=(1.4, 2.0, 2.6, 3.2), rate=1000.0, noise=0.003, channels=CHANNELS))
+    problem = problem_of(recorded(hidden, 1, speeds=(1.4, 2.0, 2.6, 3.2), rate=1000.0, noise=0.003, channels=CHANNELS))
     c = {name: candidate(problem, name) for name in ("mass", "soil-stiffness", "guide-friction")}
     base = problem.fit((), ())
     stiffer, heavier = (problem.fit((c[name],), c[name].starts()[0]) for name in ("soil-stiffness", "mass"))
@@ -330,7 +330,7 @@ def test_two_effects_without_a_first_are_tried_together() -> None:
 def test_a_fit_is_ended_finely_whatever_others_may_leave(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rounds that gain less than tells two fits apart are saved, until a fit is the last one."""
     hidden = {"effects.soil-viscous-damping.damping": 900.0}
-    problem = judge_of(recorded(hidden, 2, speeds=(1.6, 2.6), channels=CHANNELS, rate=1500.0, noise=0.005))
+    problem = problem_of(recorded(hidden, 2, speeds=(1.6, 2.6), channels=CHANNELS, rate=1500.0, noise=0.005))
     c, begun = candidate(problem, "soil-viscous-damping"), (0.05,)
     usual = problem.fit((c,), begun)
     monkeypatch.setattr(levenberg_marquardt, "TUNING", replace(levenberg_marquardt.TUNING, converged_gain=1e5))
@@ -343,7 +343,7 @@ def test_a_fit_is_ended_finely_whatever_others_may_leave(monkeypatch: pytest.Mon
     assert ended(problem, coarse).chi2 < fine.chi2 + 0.05
 
 
-def test_a_start_that_soon_beats_the_fit_goes_on() -> None:
+def test_a_start_that_beats_the_fit_in_few_rounds_goes_on() -> None:
     """Short fits to few recordings, one from the fit itself: what it gains on these alone others must gain too."""
     block = SimpleNamespace(shift=0.0)
     fitted = cast(Fitted, SimpleNamespace(candidates=(), x=(0.5,), blocks=(block, block, block)))
@@ -372,7 +372,7 @@ def test_a_start_that_soon_beats_the_fit_goes_on() -> None:
 def test_a_time_shift_in_another_minimum_restarts(dips: tuple[float, float], began: float, met: float) -> None:
     """Edges leave it in the second of two dips, 0.1 ms to either side, that leaves 11 where the first leaves 10."""
 
-    def block(_r: int, _c: Any, _x: Any, shift: float, _nudge: float, *, clock: bool) -> Any:
+    def block(_r: int, _c: Any, _x: Any, shift: float, _step: float, *, clock: bool) -> Any:
         left = min(k + min(abs(shift - dip) / 1e-4, 1.0) for k, dip in enumerate(dips)) + 10.0
         return SimpleNamespace(total=left, shift=shift, prior=1e-3)
 

@@ -14,7 +14,7 @@ from rollover.diagnosis.inference.recording_faults import lost
 from rollover.recording import Recording
 from rollover.recording.checks import prechecks
 from rollover.recording.checks.finding import trace
-from rollover.recording.checks.leaps import across, leaping, of_a_blow
+from rollover.recording.checks.jumps import across, jumping, of_an_impact
 from rollover.recording.filters import filtered
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -56,24 +56,24 @@ def spiked(v: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("done", [lambda v: v, clipped, digits, spiked])
-def test_no_signal_behind_a_filter_leaps(done: Callable[[np.ndarray], np.ndarray]) -> None:
+def test_no_signal_behind_a_filter_jumps(done: Callable[[np.ndarray], np.ndarray]) -> None:
     """An impact of no duration, a step, a push; at the end of a range, in steps of 20 times the noise, with spikes."""
     for seed in range(20):
         told = trace(made(done(behind(first_impact(), seed))), ACCELERATION)
         assert told is not None
-        assert leaping(told, 60).size == 0, seed
+        assert jumping(told, 60).size == 0, seed
 
 
-def test_gaps_are_no_leaps() -> None:
+def test_gaps_are_no_jumps() -> None:
     for seed in range(20):
         keep = np.ones(N, dtype=bool)
         keep[295:305] = keep[395:405] = False
         told = trace(made(behind(first_impact(), seed)[keep], TIME[keep]), ACCELERATION)
         assert told is not None
-        assert leaping(told, 60).size == 0, seed
+        assert jumping(told, 60).size == 0, seed
 
 
-def test_a_contact_that_opens_makes_leaps_to_and_fro() -> None:
+def test_a_contact_that_opens_makes_jumps_to_and_fro() -> None:
     """For 12 ms twice, where the signal is 20 m/s2 and 7 m/s2: four leaps, each before the sample that is the first."""
     for seed in range(20):
         values = behind(first_impact(), seed)
@@ -81,20 +81,20 @@ def test_a_contact_that_opens_makes_leaps_to_and_fro() -> None:
             values[k : k + 12] = 0.1 * np.random.default_rng(seed).standard_normal(12)
         told = trace(made(values), ACCELERATION)
         assert told is not None
-        assert leaping(told, 60).tolist() == [190, 202, 440, 452], seed
-        assert leaping(told, None).size == 0
-        assert leaping(told, 180).size == 0  # too slow for that class
+        assert jumping(told, 60).tolist() == [190, 202, 440, 452], seed
+        assert jumping(told, None).size == 0
+        assert jumping(told, 180).size == 0  # too slow for that class
         (found,) = (f for f in prechecks(made(values)) if f.check == "jump")
         assert (found.value, found.channel) == (4.0, ACCELERATION)
 
 
-def test_two_samples_about_a_leap_lie_off_by_nearly_half_of_it() -> None:
+def test_two_samples_about_a_jump_lie_off_by_nearly_half_of_it() -> None:
     """The cubic through three on either side weighs them 3/7, 3/14 and -1/7: of a step one side, 1/2; then 1/14 off."""
     off = across((np.arange(20) >= 10).astype(float))
     assert off[10] == pytest.approx(0.5)
     assert np.delete(off, 10).max() == pytest.approx(1.0 / 14.0)
-    assert of_a_blow(1000.0, 60) < 0.1
-    assert of_a_blow(2000.0, 60) < 0.01  # the faster sampled, the smoother
+    assert of_an_impact(1000.0, 60) < 0.1
+    assert of_an_impact(2000.0, 60) < 0.01  # the faster sampled, the smoother
 
 
 def test_where_channels_break_off_again_they_are_said_to() -> None:

@@ -24,7 +24,7 @@ from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.forward import full_run
 from rollover.diagnosis.forward.full_run import CENTRE, Made, Making, RunSimulator
 from rollover.diagnosis.inference import intervals as intervals_of
-from rollover.diagnosis.inference.intervals import ensemble_variance, intervals, shape_variance
+from rollover.diagnosis.inference.intervals import ensemble_variance, intervals, secondary_variance
 from rollover.diagnosis.selection.ensemble_validation import refined_under_scatter
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
@@ -97,12 +97,12 @@ def test_a_shape_that_is_not_fitted_widens_an_interval(monkeypatch: pytest.Monke
     block = problem.block(0, (SLOPE,), (0.4,), 0.0, problem.effort.fine)
     assert block is not None
     inverse = np.linalg.inv(block.J.T @ block.J)
-    found = shape_variance(problem, Fitted(candidates=(alone,), x=(0.4,), blocks=(block,)), inverse)
+    found = secondary_variance(problem, Fitted(candidates=(alone,), x=(0.4,), blocks=(block,)), inverse)
     assert found[0] == pytest.approx(1.0 / 12.0, rel=0.05)
-    assert shape_variance(problem, Fitted(candidates=(SLOPE,), x=(0.4,), blocks=(block,)), inverse) == 0.0
+    assert secondary_variance(problem, Fitted(candidates=(SLOPE,), x=(0.4,), blocks=(block,)), inverse) == 0.0
 
 
-def test_no_neighbour_is_the_run_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_perturbed_run_is_the_run_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     simulator = a_toss(monkeypatch, {})
     place = simulator._grid_centre(SETTINGS.forward.run.perturbations[0].grid_offset)
     simulator.scenario = simulator.scenario.replaced({CENTRE: place})
@@ -206,7 +206,7 @@ def test_weak_parameters_have_larger_steps_but_sensors_not() -> None:
     assert max(seen) - min(seen) < 0.02
 
 
-def test_a_step_to_the_mean_of_neighbours_holds_what_it_says() -> None:
+def test_a_step_to_the_ensembles_mean_holds_what_it_says() -> None:
     """w = J x + d, the model J x + d_0, neighbours J x + d_k: d alike. The step takes d_0 out, intervals hold x."""
     rng = np.random.default_rng(8)
     inside, plain, wide = [], [], []
@@ -347,7 +347,7 @@ def test_parameters_hold_though_runs_scatter() -> None:
     assert 0.022 < np.median(widths) < 0.03  # 0.020 where recordings could not disagree
 
 
-def test_a_move_does_not_leap_to_another_course() -> None:
+def test_a_move_does_not_jump_to_another_trajectory() -> None:
     """Where the whole move goes, from x = 0.365 to 0.385, runs take another course than was measured."""
 
     class Leaping(Rough):

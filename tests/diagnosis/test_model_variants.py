@@ -19,7 +19,7 @@ from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks
 
 DAMPING = Candidate(id="soil-viscous-damping", kind="physics", family="", search={"damping": Search(1, 2)})
-BENT = replace(DAMPING, search={"damping": Search(1, 2), "exponent": Search(0, 1)})
+VARIANT = replace(DAMPING, search={"damping": Search(1, 2), "exponent": Search(0, 1)})
 
 
 def fitted(c: Candidate, x: Sequence[float], times: float) -> Fitted:
@@ -45,14 +45,16 @@ def test_of_fits_that_lead_to_one_place_one_is_followed(ends: tuple[float, ...],
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
         if rounds == SETTINGS.fit.model_variants.short_rounds:
-            return fitted(BENT, x, 10.0 + x[1])
+            return fitted(VARIANT, x, 10.0 + x[1])
         if rounds == SETTINGS.fit.model_variants.meeting_rounds:
-            return fitted(BENT, (0.3, ends[begun.index(x[1])]), 9.0 + 0.1 * x[1])
+            return fitted(VARIANT, (0.3, ends[begun.index(x[1])]), 9.0 + 0.1 * x[1])
         whole.append(x[1])
-        return fitted(BENT, x, 8.0)
+        return fitted(VARIANT, x, 8.0)
 
     problem, start = cast(Problem, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
-    best = model_variants._best_from(problem, start, BENT, [(0.3, v) for v in begun], [b.total for b in start.blocks])
+    best = model_variants._best_from(
+        problem, start, VARIANT, [(0.3, v) for v in begun], [b.total for b in start.blocks]
+    )
     assert whole == followed
     assert best is not None
     assert best.x == (0.3, followed[0])
@@ -74,20 +76,20 @@ def test_of_short_fits_to_one_minimum_one_goes_on(near: list[tuple[float, float]
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
         if rounds == SETTINGS.fit.model_variants.short_rounds:
-            return fitted(BENT, x, dict(near)[x[1]])
+            return fitted(VARIANT, x, dict(near)[x[1]])
         if rounds == SETTINGS.fit.model_variants.meeting_rounds:
             begun.append(x[1])
-        return fitted(BENT, x, 9.0)
+        return fitted(VARIANT, x, 9.0)
 
     problem, start = cast(Problem, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
-    model_variants._best_from(problem, start, BENT, [(0.3, v) for v, _ in near], [b.total for b in start.blocks])
+    model_variants._best_from(problem, start, VARIANT, [(0.3, v) for v, _ in near], [b.total for b in start.blocks])
     assert begun == gone_on_with
 
 
 @pytest.mark.parametrize(
-    ("left", "soon", "is_followed"), [(30.0, 29.0, False), (30.0, 28.0, True), (3.0, 2.99, True), (3.0, 2.6, True)]
+    ("left", "short_fit", "is_followed"), [(30.0, 29.0, False), (30.0, 28.0, True), (3.0, 2.99, True), (3.0, 2.6, True)]
 )
-def test_far_from_noise_a_variant_that_soon_gains_is_followed(left: float, soon: float, is_followed: bool) -> None:
+def test_far_from_noise_a_variant_that_gains_is_followed(left: float, short_fit: float, is_followed: bool) -> None:
     """Short fits leave so much of what the usual shape leaves: three in a hundred is nothing, seven is a part of it.
 
     Near noise, at three times what chance leaves, any little may be all there is.
@@ -96,10 +98,10 @@ def test_far_from_noise_a_variant_that_soon_gains_is_followed(left: float, soon:
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
         whole.extend([] if rounds == SETTINGS.fit.model_variants.short_rounds else [x])
-        return fitted(BENT, x, soon)
+        return fitted(VARIANT, x, short_fit)
 
     problem, start = cast(Problem, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), left)
-    best = model_variants._best_from(problem, start, BENT, [(0.3, 0.4)], [b.total for b in start.blocks])
+    best = model_variants._best_from(problem, start, VARIANT, [(0.3, 0.4)], [b.total for b in start.blocks])
     assert (best is not None) is bool(whole) is is_followed
 
 
@@ -115,7 +117,7 @@ def test_misled_variants_restart_from_the_usual_one_on_all() -> None:
         least[:] = [1.0] if tuple(x) == stands else least
         return fitted(candidates[-1], x, 30.0 if len(x) == 1 else least[0])
 
-    found = model_variants.with_fitted_shape(
+    found = model_variants.with_fitted_secondary(
         cast(Problem, SimpleNamespace(fit=fit)), start, [b.total for b in start.blocks]
     )
     assert found is not None
@@ -124,7 +126,7 @@ def test_misled_variants_restart_from_the_usual_one_on_all() -> None:
 
 
 @pytest.mark.parametrize(
-    ("leaves", "soon", "then", "whole"),
+    ("leaves", "short_fit", "then", "whole"),
     [
         (1.0, 1.45, 1.3, 1),  # beside an explanation that leaves noise: what comes near it may be another
         (1.0, 1.45, 1.4, 0),
@@ -134,20 +136,20 @@ def test_misled_variants_restart_from_the_usual_one_on_all() -> None:
         (3.0, 5.1, 4.9, 0),
     ],
 )
-def test_a_variant_near_its_rivals_misfit_is_followed(leaves: float, soon: float, then: float, whole: int) -> None:
+def test_a_variant_near_its_rivals_misfit_is_followed(leaves: float, short_fit: float, then: float, whole: int) -> None:
     """Times what chance leaves: after a short fit to few recordings, and after a few rounds of all."""
     made = []
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
         made.extend([] if rounds else [x])
-        return fitted(BENT, x, soon if rounds == SETTINGS.fit.model_variants.short_rounds else then)
+        return fitted(VARIANT, x, short_fit if rounds == SETTINGS.fit.model_variants.short_rounds else then)
 
     start, lead = fitted(DAMPING, (0.3,), 6.0), fitted(DAMPING, (0.3,), leaves)
     size = sum(b.residual.size for b in lead.blocks)
     scale = leaves * size / lead.total  # blocks of chance: what they leave is nearly their number
     problem = cast(Problem, SimpleNamespace(fit=lambda *a, **k: _scaled(fit(*a, **k), scale)))
     model_variants._best_from(
-        problem, _scaled(start, scale), BENT, [(0.3, 0.4)], [scale * b.total for b in lead.blocks]
+        problem, _scaled(start, scale), VARIANT, [(0.3, 0.4)], [scale * b.total for b in lead.blocks]
     )
     assert len(made) == whole
 

@@ -125,7 +125,7 @@ def test_filtered_noise_is_flat_once_whitened() -> None:
     assert sigma == pytest.approx(np.std(np.concatenate(series)), rel=0.03)
 
 
-def test_hum_is_not_taken_for_the_memory_of_noise() -> None:
+def test_a_spectral_line_is_not_taken_for_autocorrelation() -> None:
     rng = np.random.default_rng(12)
     t = np.arange(600)
     series = [3.0 * np.sin(0.3 * t + k) + 0.1 * rng.standard_normal(600) for k in range(4)]
@@ -134,7 +134,7 @@ def test_hum_is_not_taken_for_the_memory_of_noise() -> None:
     assert not np.any((np.abs(roots) > 0.9) & (np.abs(roots.imag) > 0.0))
 
 
-def test_after_a_blow_nothing_is_quiet() -> None:
+def test_after_an_impact_nothing_is_quiet() -> None:
     """Where a run depends on chance, from 0.1 s on, it is off by three times the noise."""
     rng = np.random.default_rng(29)
 

@@ -53,7 +53,7 @@ def test_offsets_are_estimated_despite_missing_physics(hidden: dict[str, float])
     assert abs(np.mean(z)) < 0.7
 
 
-def test_where_zeros_are_one_none_is_touched() -> None:
+def test_where_offsets_are_one_none_is_corrected() -> None:
     made, _ = moved(drops({}), dict.fromkeys(CHANNELS, 0.0), 2.0)
     assert all(s.zero == s.zero_error == 0.0 for e in reweighted(made) for s in e.signals)
 
@@ -77,7 +77,7 @@ def test_offsets_that_differ_are_reported_and_no_mismatch(size: float) -> None:
     assert not any(n.startswith(DEPTH) for n in told)
 
 
-def test_what_is_missing_is_found_beside_zeros_that_differ() -> None:
+def test_what_is_missing_is_found_beside_offsets_that_differ() -> None:
     made, _ = moved(drops(LAYER), dict.fromkeys(CHANNELS, 3.0), 0.0)
     found = diagnose(scenario(), made)
     assert [e.id for e in found.effects] == ["soil-layer"], found.sentence
@@ -96,7 +96,7 @@ def test_a_mean_offset_remains_only_if_significant() -> None:
     assert _own(of(near)) == list(near)
 
 
-def test_zeros_of_all_channels_are_judged_together() -> None:
+def test_offsets_of_all_channels_are_judged_together() -> None:
     """Chi-square of 6 at 22 is p = 0.0012 and of 18 at 66 is 2e-7."""
     one = of((3.3, -0.3, -3.3, 0.3, 0.0, 0.0, 0.0))
     assert not _differ([one])

@@ -79,7 +79,7 @@ def test_a_diagnosis_reports_a_wrong_clock_and_frees_it() -> None:
     assert not any("left as it is" in note for note in unknown.notes)
 
 
-def test_what_begins_within_its_blow_is_laid_over_the_simulation() -> None:
+def test_what_begins_within_its_impact_is_laid_over_the_run() -> None:
     """From 20 ms after the contact on, on a clock 0.4 s late: its first sample is no contact."""
     given = [
         (name, replace(r, time=r.time[50:], channels={c: v[50:] for c, v in r.channels.items()}))

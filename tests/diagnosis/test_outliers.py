@@ -21,7 +21,7 @@ def loose(rng: np.random.Generator, n: int = N, ensemble_validated: int = 3) -> 
     return found
 
 
-def test_what_lies_far_off_gives_way_to_its_neighbours() -> None:
+def test_what_lies_far_off_gives_way_to_samples_beside_it() -> None:
     rng = np.random.default_rng(1)
     plain = rng.standard_normal(4000) + np.sin(np.arange(4000) / 40.0)
     assert np.mean(without_outliers(plain) != plain) < 1e-3
@@ -31,7 +31,7 @@ def test_what_lies_far_off_gives_way_to_its_neighbours() -> None:
         np.testing.assert_array_equal(without_outliers(kept), kept)  # too few; no noise; bursts that are the rule
 
 
-def test_noise_is_that_beside_the_bursts() -> None:
+def test_noise_is_that_beside_the_outliers() -> None:
     """They leave no window quiet: by windows it would be several times as large."""
     rng = np.random.default_rng(2)
     several = [dataset(loose(rng)) for _ in range(4)]
@@ -51,7 +51,7 @@ def test_far_off_is_too_often_what_no_noise_has() -> None:
     assert outlier_p_value([]) == 1.0
 
 
-def test_rare_bursts_are_a_mismatch_though_they_are_rough() -> None:
+def test_rare_outliers_are_a_mismatch_though_they_are_rough() -> None:
     rng = np.random.default_rng(4)
     times = STEP * np.arange(N)
     found = []

@@ -146,7 +146,7 @@ def test_a_run_that_loses_its_way_is_given_up(monkeypatch: pytest.MonkeyPatch) -
     assert simulator.predict({FRICTION: 0.4}, 0.0) is None
 
 
-def test_runs_made_side_by_side_are_those_made_one_by_one() -> None:
+def test_runs_made_in_parallel_are_those_made_in_turn() -> None:
     paths = ({"ground.friction.coefficient": 0.2}, {"ground.friction.coefficient": 0.4}, {})
     alone, helped = (RunSimulator(toss(), recording("chassis/acceleration_z")) for _ in range(2))
     children = Children(2)
@@ -199,7 +199,7 @@ def test_phases_are_cut_to_the_recording() -> None:
     assert phases(found)[0][0] == made.time[0]
 
 
-def test_neighbours_stray_after_the_first_contact_only() -> None:
+def test_perturbed_runs_diverge_after_the_first_contact_only() -> None:
     simulator = RunSimulator(toss(), recording(Z, ROLL, until=0.5))
     perturbed = simulator.perturbed()
     assert len(perturbed) == len(SETTINGS.forward.run.perturbations)
@@ -211,7 +211,7 @@ def test_neighbours_stray_after_the_first_contact_only() -> None:
     assert max(np.max(np.abs(s[ROLL][time > touch])) for s in perturbed) > 1e-4
 
 
-def test_all_neighbours_may_be_run_in_shorter_steps() -> None:
+def test_the_whole_ensemble_may_be_run_in_shorter_steps() -> None:
     simulator = RunSimulator(toss(), recording(Z))
     own = simulator.scenario.simulation.step
     steps = {
@@ -258,7 +258,7 @@ def test_scatter_is_asked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [n for n in made if n > 1] == 2 * [1 + len(SETTINGS.forward.run.perturbations)]
 
 
-def test_the_motion_is_told_though_it_was_not_recorded() -> None:
+def test_the_motion_is_estimated_though_not_recorded() -> None:
     simulator = RunSimulator(toss(), recording(Z))
     state = simulator.state(0.002)
     whole = run()

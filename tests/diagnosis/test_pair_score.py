@@ -13,7 +13,7 @@ from rollover.diagnosis.selection import pairs
 from rollover.diagnosis.selection.score_test import ScoreTest, best_direction_pairs, score_test
 from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
-from tests.diagnosis.test_fits import candidate, judge_of
+from tests.diagnosis.test_fits import candidate, problem_of
 from tests.diagnosis.test_pairs import DAMPING, GRADUAL, MASS, NOSE, fitted, inquiry, screened
 
 
@@ -70,10 +70,10 @@ def test_pairs_take_the_best_directions_of_two_effects() -> None:
     assert all(len(p) == 2 for p in told)
 
 
-def test_a_gate_leads_to_two_that_hide_each_other() -> None:
+def test_the_pair_score_leads_to_two_that_hide_each_other() -> None:
     """Friction and a co-moving mass that grows push against each other: alone the second gains hardly anything."""
     hidden = {"effects.guide-friction.force": 60.0, "effects.soil-added-mass-growth.rate": 20.0}
-    problem = judge_of(
+    problem = problem_of(
         recorded(hidden, 5, speeds=(1.5, 2.0, 2.5, 3.0), channels=(FORCE, DEPTH, ACCELERATION), rate=600.0, noise=0.02)
     )
     kinds = [candidate(problem, key) for key in ("guide-friction", "soil-added-mass-growth", "mass", "soil-stiffness")]

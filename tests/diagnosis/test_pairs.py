@@ -21,7 +21,7 @@ from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks, recorded
-from tests.diagnosis.test_fits import candidate, judge_of
+from tests.diagnosis.test_fits import candidate, problem_of
 
 RATIO = Search(0.2, 5.0, "log")
 MASS = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
@@ -74,9 +74,9 @@ def test_a_lone_variant_is_tried_in_its_usual_form_in_pairs() -> None:
 
 def test_a_trailing_variant_is_tried_in_its_usual_form_too() -> None:
     """Damping with a layer is neither by itself: a layer from the top on leads, a proportional damping comes next."""
-    lead, bent = fitted((MASS,), 4.0), fitted((PROPORTION,), 6.0)
+    lead, curved = fitted((MASS,), 4.0), fitted((PROPORTION,), 6.0)
     first = Step(
-        base=fitted((), 30.0), fitted=lead, p_value=0.0, rivals=(lead, bent),
+        base=fitted((), 30.0), fitted=lead, p_value=0.0, rivals=(lead, curved),
         screened=(screened(DAMPING), screened(MASS)),
     )  # fmt: skip
     scored = ScoreTest(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
@@ -91,17 +91,17 @@ def test_a_trailing_variant_is_tried_in_its_usual_form_too() -> None:
 def test_all_oscillatory_pairs_are_fitted_with_their_share() -> None:
     """With a wrong share of the nose the wrong other effect may lead, as a mass before an impact speed."""
     asked: list[Any] = []
-    bent = replace(MASS, id="soil-adhesion", secondary={"reach": Search(1, 2)})
+    curved = replace(MASS, id="soil-adhesion", secondary={"reach": Search(1, 2)})
     whole = [
         fitted((NOSE, MASS), 30.0),
         fitted((DAMPING, NOSE), 20.0),
-        fitted((replace(bent, id="soil-layer"), bent), 20.0),
+        fitted((replace(curved, id="soil-layer"), curved), 20.0),
     ]
     far = fitted((replace(MASS, id="soil-stiffness"), NOSE), 100.0)
     found = pairs._with_secondary_fitted(inquiry(asked), [*whole, far])
     assert [(j.how, [c.id for c in j.candidates]) for j in asked] == [
-        ("shape", ["mass", "structural-compliance"]),
-        ("shape", ["soil-viscous-damping", "structural-compliance"]),
+        ("secondary", ["mass", "structural-compliance"]),
+        ("secondary", ["soil-viscous-damping", "structural-compliance"]),
     ]
     assert [sorted(f.candidates[-1].search) for f in found] == [["damping", "nose_share", "stiffness"]] * 2
     assert {len(j.leaves) for j in asked} == {2}
@@ -160,16 +160,16 @@ LAYER, CRUST = (
     )
     for name, at in (("layer", "depth"), ("crust", "thickness"))
 )
-BENT = replace(CRUST, search={**CRUST.search, "width": Search(0.001, 0.1, "log")})
+VARIANT = replace(CRUST, search={**CRUST.search, "width": Search(0.001, 0.1, "log")})
 OF_ITS_OWN = replace(LAYER, search={"depth": Search(0.01, 1, "log"), "stiffness": Search(1, 9)}, variant={"onset": 1.0})
 
 
 @pytest.mark.parametrize(
     ("pair", "places"),
     [
-        ((DAMPING, BENT), [("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.0})]),
-        ((BENT, DAMPING), [("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.0})]),
-        ((PROPORTION, BENT), [("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.0})]),
+        ((DAMPING, VARIANT), [("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.0})]),
+        ((VARIANT, DAMPING), [("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.0})]),
+        ((PROPORTION, VARIANT), [("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.0})]),
         ((DAMPING, OF_ITS_OWN), []),
         ((DAMPING, MASS), []),
     ],
@@ -191,7 +191,7 @@ def test_what_is_stiffer_above_is_tried_as_what_is_softer_below(
     assert [(len(j.candidates[0].search), j.candidates[0].fixed.keys()) for j in asked[: len(places)]] == [
         (0, {"depth", "stiffness_ratio"})
     ] * len(places)
-    assert [j.candidates[0] for j in asked[len(places) :]] == [c for c in pair if c is not BENT][: len(places)]
+    assert [j.candidates[0] for j in asked[len(places) :]] == [c for c in pair if c is not VARIANT][: len(places)]
 
 
 RATE, DEPTH = 0.05, 0.13  # per decade, m
@@ -204,7 +204,7 @@ def layered(ratio: float, depth: float = DEPTH) -> Problem:
         "effects.soil-layer.depth": depth,
         "effects.soil-layer.stiffness_ratio": ratio,
     }
-    return judge_of(recorded(hidden, 3, speeds=(1.4, 1.9, 2.6), noise=0.003, rate=1000.0))
+    return problem_of(recorded(hidden, 3, speeds=(1.4, 1.9, 2.6), noise=0.003, rate=1000.0))
 
 
 @pytest.mark.parametrize(("ratio", "lost"), [(0.7, 500.0), (1.3, 0.0)])
@@ -249,12 +249,12 @@ def test_what_sets_in_somewhere_says_how_strong_it_is_and_where() -> None:
 def test_leaders_and_thresholds_are_scanned_in_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
     search = {"depth": Search(0.01, 1.0, "log"), "stiffness_ratio": Search(0.2, 5.0, "log")}
     layer = Candidate(id="soil-layer", kind="physics", family="", search=search)
-    bent = replace(layer, id="soil-crust", variant={"a": 1.0})
-    partners = [(MASS, (0.1,)), (DAMPING, (0.2,)), (layer, (0.3, 0.4)), (bent, (0.5, 0.6)), (PROPORTION, (0.7,))]
+    curved = replace(layer, id="soil-crust", variant={"a": 1.0})
+    partners = [(MASS, (0.1,)), (DAMPING, (0.2,)), (layer, (0.3, 0.4)), (curved, (0.5, 0.6)), (PROPORTION, (0.7,))]
     tried: list[Any] = []
 
-    def parallel_map(look: Any, ways: list[Any]) -> list[Any]:
-        tried.append((look.keywords, [(a.id, x, c.id) for a, x, c in ways]))
+    def parallel_map(scan: Any, ways: list[Any]) -> list[Any]:
+        tried.append((scan.keywords, [(a.id, x, c.id) for a, x, c in ways]))
         return [None, *((*x, 0.8, 0.9) for _, x, _ in ways[1:])]
 
     asking = cast(Inquiry, SimpleNamespace(parallel_map=parallel_map))
@@ -322,7 +322,7 @@ def test_far_less_is_far_less_beyond_the_noise(
 
 
 @pytest.mark.parametrize(("left", "taken"), [(1.2, True), (1.5, False)])
-def test_three_become_two_only_where_the_third_is_not_needed(
+def test_three_become_two_only_where_the_third_is_not_retained(
     left: float, taken: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Weighed as noise by all that a pair leaves, what the third effect takes would be noise: it takes 40 of 80."""
@@ -353,13 +353,13 @@ def test_a_pair_that_leaves_nearly_noise_tells_of_it(
     found = Step(base=fitted((), 30.0), fitted=fitted((MASS,), 2.0), p_value=0.0)
     reweighted: list[Any] = []
 
-    def with_noise_model(_judge: Any, fit: Fitted, _phases: Any) -> bool:
+    def with_noise_model(_problem: Any, fit: Fitted, _phases: Any) -> bool:
         reweighted.append(fit)
         return is_noise
 
     monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
     monkeypatch.setattr(pairs, "followed", lambda _, one: (one, SimpleNamespace(p_value=p_value)))
-    monkeypatch.setattr(pairs, "is_enough", lambda _judge, _fit, left: left.p_value > 0.001)
+    monkeypatch.setattr(pairs, "is_enough", lambda _problem, _fit, left: left.p_value > 0.001)
     monkeypatch.setattr(pairs, "with_noise_of_fit", with_noise_model)
     monkeypatch.setattr(pairs, "mismatch_of", lambda *_: SimpleNamespace(p_value=0.4))
     asking = inquiry([])

@@ -16,12 +16,12 @@ from rollover.diagnosis.data.whitening import Whitening
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinates
-from rollover.diagnosis.planning import strength as chances
+from rollover.diagnosis.planning import separation as chances
 from rollover.diagnosis.planning.next_test import next_test
 from rollover.diagnosis.planning.plan import plan, usual_noise
 from rollover.diagnosis.planning.planned import Instruments, autoregressive, only, planned, showing
 from rollover.diagnosis.planning.separation import Tests as PlannedTests
-from rollover.diagnosis.planning.strength import point_where_it_acts, strength_with
+from rollover.diagnosis.planning.separation import point_where_it_acts, strength_with
 from rollover.diagnosis.prepared import prepared, weighted_datasets
 from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from rollover.diagnosis.settings import SETTINGS

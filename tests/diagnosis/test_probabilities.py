@@ -37,11 +37,11 @@ def beside(
 def test_what_conditions_held_out_tell_bounds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two in five before, three in five for the others: odds of 2/3 times -e p ln p at most."""
     left = 0.02, {"soil-layer": 0.016, "soil-crust": 0.018}
-    free, by_chance, surely = (beside(monkeypatch, *left, p_value=p) for p in (1.0, 0.5, 1e-4))
+    free, by_chance, certain = (beside(monkeypatch, *left, p_value=p) for p in (1.0, 0.5, 1e-4))
     assert by_chance == free
-    assert surely["nothing"] / (1.0 - surely["nothing"]) == pytest.approx(2 / 3 * np.e * 1e-4 * np.log(1e4))
+    assert certain["nothing"] / (1.0 - certain["nothing"]) == pytest.approx(2 / 3 * np.e * 1e-4 * np.log(1e4))
     ratio = free["soil-layer"] / free["soil-crust"]
-    assert surely["soil-layer"] / surely["soil-crust"] == pytest.approx(ratio)
+    assert certain["soil-layer"] / certain["soil-crust"] == pytest.approx(ratio)
     assert beside(monkeypatch, *left, p_value=0.0)["nothing"] == 0.0
     # what leaves so much that it is out of the question stays so
     assert beside(monkeypatch, 0.3, left[1], p_value=0.3)["nothing"] == beside(monkeypatch, 0.3, left[1])["nothing"]

@@ -15,8 +15,7 @@ from rollover.diagnosis.data.dataset import dataset_of, left_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.forward_model import set_up, simulator_of
-from rollover.diagnosis.inference.residual_law import best_subsets, proposed
-from rollover.diagnosis.inference.weak_form import Balance, _tests, balances
+from rollover.diagnosis.inference.residual_law import Balance, _tests, balances, best_subsets, proposed
 from rollover.diagnosis.io import diagnosed_scenario
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.dynamics.drop_test import DropModel

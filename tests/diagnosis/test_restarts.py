@@ -43,7 +43,7 @@ def begun(promised: float, gained: float) -> list[str]:
 
     asked: list[str] = []
 
-    def parallel_map(look: Any, things: list[Any]) -> list[Any]:
+    def parallel_map(scan: Any, things: list[Any]) -> list[Any]:
         """Least is left at the last of the places."""
         assert sum(len(places) for _, places in things) == (40 if things else 0)
         return [(1.0 if x[1] > 0.98 else 2.0, x) for _, (*_, x) in things]
@@ -92,7 +92,7 @@ def test_a_discontinuous_effect_is_scanned_not_linearised() -> None:
 
 @pytest.mark.parametrize(("score", "combed"), [(50.0, True), (30.0, False)])
 def test_the_best_oscillatory_effect_is_scanned_in_frequency(score: float, combed: bool) -> None:
-    rings = replace(
+    oscillatory = replace(
         PLAIN, id="structural-compliance", search={"stiffness": Search(1e4, 1e7, "log"), "damping": Search(1.0, 1e4)}
     )
     blocks = tuple(
@@ -100,7 +100,7 @@ def test_the_best_oscillatory_effect_is_scanned_in_frequency(score: float, combe
     )
     best = Fitted(candidates=(PLAIN,), x=(0.5,), blocks=blocks)
     astray = Fitted(
-        candidates=(rings,), x=(0.5, 0.5), blocks=tuple(replace(b, residual=2.0 * b.residual) for b in blocks)
+        candidates=(oscillatory,), x=(0.5, 0.5), blocks=tuple(replace(b, residual=2.0 * b.residual) for b in blocks)
     )
     asked: list[str] = []
 
@@ -109,9 +109,9 @@ def test_the_best_oscillatory_effect_is_scanned_in_frequency(score: float, combe
         return [None] * len(tasks)
 
     inquiry = SimpleNamespace(
-        free=lambda _: [PLAIN, rings], fits=fits, parallel_map=lambda look, things: [None] * len(things)
+        free=lambda _: [PLAIN, oscillatory], fits=fits, parallel_map=lambda scan, things: [None] * len(things)
     )
-    scored = ScoreTest(score=50.0, scores={"mass": 40.0, rings.key: score}, null=np.zeros(9), detectable={})
+    scored = ScoreTest(score=50.0, scores={"mass": 40.0, oscillatory.key: score}, null=np.zeros(9), detectable={})
     assert from_other_starts(cast(Inquiry, inquiry), best, [best, astray], scored, (0.0, 0.0)) == [best, astray]
     assert asked == ["polish structural-compliance", "time structural-compliance"] * combed
 
@@ -144,7 +144,7 @@ def test_a_time_shift_is_that_of_the_lowest_minimum() -> None:
     assert moved.chi2 < late.chi2
 
 
-def test_a_misled_fit_restarts_and_goes_on_if_it_soon_gains() -> None:
+def test_a_misled_fit_restarts_and_goes_on_if_it_gains() -> None:
     """The base leaves 400 and the best 200: one comes to 290 in a few rounds and to 250 in the end, one to 310."""
     asked: list[Task] = []
 

@@ -16,16 +16,16 @@ from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import without_effect
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.selection.forward_step import reusable_slopes
-from rollover.diagnosis.selection.scan import score_candidates
+from rollover.diagnosis.selection.screening import score_candidates
 from rollover.diagnosis.settings import SETTINGS
-from tests.diagnosis.test_scan import judge_of as looks_of
+from tests.diagnosis.test_scan import problem_of as looks_of
 from tests.diagnosis.test_slopes import CHANNEL, MASS, SIGMA, SLOPE, TIME, Late, dataset
 
 Place = tuple[float, float]
 WAVES = np.sin(30.0 * TIME), np.cos(70.0 * TIME)
 
 
-class Bent(Late):
+class Curved(Late):
     """y = 40 (x + bend x^2) sin(30 t) + 40 o cos(70 t); `asked` are the (x, o) of its runs, in their order."""
 
     def __init__(self, bend: float) -> None:
@@ -37,14 +37,14 @@ class Bent(Late):
         return {CHANNEL: 40.0 * (x + self.bend * x**2) * WAVES[0] + 40.0 * o * WAVES[1]}
 
 
-def judge_of(x: float, o: float, bend: float = 0.0, effort: Any = SETTINGS.forward.runs) -> tuple[Problem, Bent]:
-    runs = Bent(bend)
+def problem_of(x: float, o: float, bend: float = 0.0, effort: Any = SETTINGS.forward.runs) -> tuple[Problem, Curved]:
+    runs = Curved(bend)
     values = runs.predict({"effects.slope.angle": x, "effects.mass.added": o}, 0.0)[CHANNEL]
     runs.asked.clear()
     return Problem([dataset(values, runs, effort)]), runs
 
 
-def beside(runs: Bent, at: Place) -> set[Place]:
+def beside(runs: Curved, at: Place) -> set[Place]:
     """Runs to either side of a place, of those that a slope asks for where a fit ends."""
     x, o = at
     sides = {
@@ -69,14 +69,14 @@ def fitted(problem: Problem, start: Place, base: Fitted | None) -> Fitted:
     return found
 
 
-@pytest.mark.parametrize("is_lent", [True, False])
-def test_a_fit_starts_with_reused_columns_and_ends_with_own(is_lent: bool) -> None:
-    problem, runs = judge_of(0.5, 0.6, bend=0.5)
+@pytest.mark.parametrize("is_reused", [True, False])
+def test_a_fit_starts_with_reused_columns_and_ends_with_own(is_reused: bool) -> None:
+    problem, runs = problem_of(0.5, 0.6, bend=0.5)
     base = base_at(problem, 0.45)
     runs.asked.clear()
-    found = fitted(problem, (0.45, 0.2), base if is_lent else None)
+    found = fitted(problem, (0.45, 0.2), base if is_reused else None)
     first = [at for at in runs.asked if at[1] == 0.2]
-    assert set(first) == {(0.45, 0.2), *(() if is_lent else ((0.42, 0.2), (0.48, 0.2)))}
+    assert set(first) == {(0.45, 0.2), *(() if is_reused else ((0.42, 0.2), (0.48, 0.2)))}
     assert found.x == pytest.approx((0.5, 0.6), abs=1e-4)  # 3e-5 leaves the gain of 4 at which a search ends
     other = problem.again(found)
     for block, own in zip(found.blocks, other.blocks, strict=True):
@@ -85,7 +85,7 @@ def test_a_fit_starts_with_reused_columns_and_ends_with_own(is_lent: bool) -> No
 
 def test_slopes_of_another_place_are_no_reason_to_end() -> None:
     """Those lent have the wrong sign: every way that they point leaves more, and a fit's own lead on."""
-    problem, _ = judge_of(0.5, 0.6)
+    problem, _ = problem_of(0.5, 0.6)
     base = base_at(problem, 0.3)
     turned = replace(base, blocks=tuple(replace(b, J=-b.J) for b in base.blocks))
     assert fitted(problem, (0.3, 0.6), turned).x == pytest.approx((0.5, 0.6), abs=1e-4)
@@ -94,7 +94,7 @@ def test_slopes_of_another_place_are_no_reason_to_end() -> None:
 @pytest.mark.parametrize(("bend", "no_jacobian", "told"), [(0.0, True, 1), (4.0, True, 2), (0.0, False, 2)])
 def test_a_short_fit_keeps_slopes_that_predicted_well(bend: float, no_jacobian: bool, told: int) -> None:
     """Of what is straight the first step leaves next to nothing; bent, it goes half as far again as it should."""
-    problem, runs = judge_of(0.5, 0.6, bend)
+    problem, runs = problem_of(0.5, 0.6, bend)
     found = problem.fit((MASS, SLOPE), (0.2, 0.2), width=1, rounds=2, no_jacobian=no_jacobian)
     assert found is not None
     places = [at for at in runs.asked if len({x for x, o in beside(runs, at) if o == at[1]}) == 2]
@@ -103,12 +103,12 @@ def test_a_short_fit_keeps_slopes_that_predicted_well(bend: float, no_jacobian: 
 
 
 @pytest.mark.parametrize("is_beside", [True, False])
-def test_a_fit_ends_with_the_slopes_of_a_place_beside_it(is_beside: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fit_ends_with_the_slopes_of_a_point_beside_it(is_beside: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Slopes lent are twice too steep: half the way gains three quarters of 4.7, less than goes on, so all are told.
 
     The step that these lead to ends 2e-5 further on.
     """
-    problem, runs = judge_of(0.5, 0.6)
+    problem, runs = problem_of(0.5, 0.6)
     at = 0.5 - float(np.sqrt(4.7)) / float(np.linalg.norm(40.0 * WAVES[0] / SIGMA))
     base = base_at(problem, at)
     steep = replace(base, blocks=tuple(replace(b, J=2.0 * b.J) for b in base.blocks))
@@ -122,7 +122,7 @@ def test_a_fit_ends_with_the_slopes_of_a_place_beside_it(is_beside: bool, monkey
 
 
 def test_a_fit_cut_short_ends_with_its_own_jacobian() -> None:
-    problem, runs = judge_of(0.5, 0.6)
+    problem, runs = problem_of(0.5, 0.6)
     reused = reusable_slopes(problem, base_at(problem, 0.2))
     found = problem.fit((SLOPE, MASS), (0.2, 0.2), width=1, rounds=1, reused=reused)
     assert found is not None
@@ -130,9 +130,9 @@ def test_a_fit_cut_short_ends_with_its_own_jacobian() -> None:
     assert len(beside(runs, (round(x, 9), round(o, 9)))) == 4
 
 
-@pytest.mark.parametrize(("effort", "is_lent"), [(SETTINGS.forward.runs, True), (SETTINGS.forward.drops, False)])
-def test_a_reduced_fit_starts_with_the_others_columns(effort: Any, is_lent: bool) -> None:
-    problem, runs = judge_of(0.5, 0.6, effort=effort)
+@pytest.mark.parametrize(("effort", "is_reused"), [(SETTINGS.forward.runs, True), (SETTINGS.forward.drops, False)])
+def test_a_reduced_fit_starts_with_the_others_columns(effort: Any, is_reused: bool) -> None:
+    problem, runs = problem_of(0.5, 0.6, effort=effort)
     whole = problem.fit((SLOPE, MASS), (0.5, 0.6))
     assert whole is not None
     runs.asked.clear()
@@ -141,12 +141,12 @@ def test_a_reduced_fit_starts_with_the_others_columns(effort: Any, is_lent: bool
     assert rest.candidates == (SLOPE,)
     assert all(o == 0.0 for _, o in runs.asked)
     steps = [effort.fd_steps[0], effort.fd_steps[0] + SETTINGS.forward.runs.fd_steps[0]]
-    assert any((round(0.5 - step, 9), 0.0) in runs.asked for step in steps) != is_lent
+    assert any((round(0.5 - step, 9), 0.0) in runs.asked for step in steps) != is_reused
     assert not any(b.J.any() for b in rest.blocks)
 
 
-def test_slopes_are_lent_where_they_cost_runs_alone() -> None:
-    problem, _ = judge_of(0.5, 0.6)
+def test_slopes_are_reused_where_they_cost_runs_alone() -> None:
+    problem, _ = problem_of(0.5, 0.6)
     base = base_at(problem, 0.45)
     reused = reusable_slopes(problem, base, [0])
     assert reused is not None
@@ -154,11 +154,11 @@ def test_slopes_are_lent_where_they_cost_runs_alone() -> None:
     nothing = problem.fit((), ())
     assert nothing is not None
     assert reusable_slopes(problem, nothing) is None
-    cheap, _ = judge_of(0.5, 0.6, effort=SETTINGS.forward.drops)
+    cheap, _ = problem_of(0.5, 0.6, effort=SETTINGS.forward.drops)
     assert reusable_slopes(cheap, base_at(cheap, 0.45)) is None
 
 
-def test_a_job_with_other_slopes_is_another_job() -> None:
+def test_a_task_with_other_slopes_is_another_task() -> None:
     task = Task(candidates=(SLOPE, MASS), start=(0.45, 0.2), shifts=(0.0,), width=1)
     reused = [replace(task, reused=(np.full((3, 1), slope),)) for slope in (1.0, 1.0, 2.0)]
     keys = [one.key("") for one in (task, *reused)]
@@ -166,8 +166,8 @@ def test_a_job_with_other_slopes_is_another_job() -> None:
     assert len(set(keys)) == 3
 
 
-def test_a_job_asks_for_no_runs_beside_what_is_lent(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem, _ = judge_of(0.5, 0.6)
+def test_a_task_asks_for_no_runs_beside_reused_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, _ = problem_of(0.5, 0.6)
     base = base_at(problem, 0.45)
     wanted: list[tuple[float, ...]] = []
     monkeypatch.setattr(Problem, "made_ahead", lambda _, points: wanted.extend(tuple(x) for _, _, x in points))
@@ -185,7 +185,7 @@ def test_a_short_fit_that_is_taken_up_again_has_no_slopes_either(tmp_path: Path)
     task = Task(candidates=(SLOPE, MASS), start=(0.45, 0.2), shifts=(0.0,), rounds=2)
     found = []
     for _ in range(2):
-        problem, runs = judge_of(0.5, 0.6, bend=0.5)
+        problem, runs = problem_of(0.5, 0.6, bend=0.5)
         with Executor(notebook=tmp_path / "fits") as executor:
             (fit,) = executor.fits(problem, [task])
         assert fit is not None
@@ -197,7 +197,7 @@ def test_a_short_fit_that_is_taken_up_again_has_no_slopes_either(tmp_path: Path)
 
 
 def test_what_counts_otherwise_has_the_slopes_that_it_had() -> None:
-    problem, _ = judge_of(0.5, 0.6, bend=0.5)
+    problem, _ = problem_of(0.5, 0.6, bend=0.5)
     base = base_at(problem, 0.45)
     steep = replace(base, blocks=tuple(replace(b, J=2.0 * b.J) for b in base.blocks))
     problem.heavy_tailed = False
@@ -207,8 +207,8 @@ def test_what_counts_otherwise_has_the_slopes_that_it_had() -> None:
     np.testing.assert_array_equal(found.blocks[0].residual, base.blocks[0].residual)
 
 
-def test_no_run_is_announced_beside_what_is_lent(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem, _ = judge_of(0.5, 0.6)
+def test_no_run_is_announced_beside_reused_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, _ = problem_of(0.5, 0.6)
     reused, wanted = reusable_slopes(problem, base_at(problem, 0.45)), list[Place]()
     monkeypatch.setattr(
         Problem, "made_ahead", lambda _, points: wanted.extend((round(x[0], 9), round(x[1], 9)) for _, _, x in points)

@@ -15,7 +15,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.noise.ensemble import HeavyTail
-from rollover.diagnosis.selection import scan
+from rollover.diagnosis.selection import screening
 from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.selection.score_test import ScoreTest, _best_amplitude, _birge_ratio, _visible, score_test
 from rollover.diagnosis.selection.screening import _begun_at, promising
@@ -48,7 +48,7 @@ class Wave:
 SLOPE = Candidate(id="slope", kind="parameter", family="x", search={"angle": Search(-100.0, 100.0)}, null=(0.5,))
 
 
-def judge_of(
+def problem_of(
     after: tuple[float, ...], amplitudes: tuple[float, ...], *, first_impact: float = IMPACT
 ) -> tuple[Problem, Fitted]:
     """Recordings with so much of the wave before the impact, and noise; and the base."""
@@ -94,9 +94,9 @@ def test_agreeing_recordings_count_in_full_a_lone_one_hardly() -> None:
 
 
 def test_an_effect_of_all_beats_one_of_a_divergent_recording() -> None:
-    problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    problem, base = problem_of((0.0,) * 4, (2.0,) * 4)
     everywhere = score_test(problem, base, [SLOPE])
-    problem, base = judge_of((0.0,) * 4, (4.0, 0.0, 0.0, 0.0))  # as much in all
+    problem, base = problem_of((0.0,) * 4, (4.0, 0.0, 0.0, 0.0))  # as much in all
     alone = score_test(problem, base, [SLOPE])
     assert everywhere.score > 100.0
     assert alone.score < 0.1 * everywhere.score
@@ -104,12 +104,12 @@ def test_an_effect_of_all_beats_one_of_a_divergent_recording() -> None:
 
 def test_an_effect_before_the_impact_is_screened_by_itself() -> None:
     """After the impact the run with the effect goes ten times as far the wrong way."""
-    problem, base = judge_of((10.0,) * 4, (2.0,) * 4)
+    problem, base = problem_of((10.0,) * 4, (2.0,) * 4)
     with_ = score_test(problem, base, [SLOPE])
-    blind, base = judge_of((10.0,) * 4, (2.0,) * 4, first_impact=np.inf)
+    blind, base = problem_of((10.0,) * 4, (2.0,) * 4, first_impact=np.inf)
     assert with_.score > 10.0 * score_test(blind, base, [SLOPE]).score
     assert with_.score > 100.0
-    problem, base = judge_of((10.0,) * 4, (2.0,) * 4)
+    problem, base = problem_of((10.0,) * 4, (2.0,) * 4)
     faint = replace(
         SLOPE,
         search={
@@ -136,10 +136,10 @@ def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.Monk
             points={"c2": ((0.7,), (0.1,))}, starts=begun[len(only)],
         )  # fmt: skip
 
-    monkeypatch.setattr(scan, "score_test", scored)
-    problem, base = judge_of((0.0,) * 5, (0.0,) * 5)
+    monkeypatch.setattr(screening, "score_test", scored)
+    problem, base = problem_of((0.0,) * 5, (0.0,) * 5)
     every = [replace(SLOPE, id=f"c{k}") for k in range(30)] + [replace(SLOPE, id="c77", kind="sensor")]
-    found = scan.score_candidates(problem, base, every, [[r] for r in range(5)])
+    found = screening.score_candidates(problem, base, every, [[r] for r in range(5)])
     assert [n for n, _ in asked] == [SETTINGS.forward.runs.few, SETTINGS.forward.runs.looked_at]
     assert len(asked[0][1]) == 31
     assert asked[1][1] == [f"c{k}" for k in range(SETTINGS.forward.runs.shortlist)] + ["c77"]
@@ -151,7 +151,7 @@ def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.Monk
     assert found.starts == {"c3": ((0.4,), (0.3,)), "c4": ((0.6,),)}  # of more recordings first
 
 
-def test_a_look_says_where_an_effect_told_most() -> None:
+def test_a_scan_says_where_an_effect_scored_most() -> None:
     """d = sin(30 t + 6 x) of place x, measured sin(30 t + 6 x0): the gain falls with |x - x0|, up to a quarter turn."""
 
     class Turned(Wave):
@@ -160,7 +160,7 @@ def test_a_look_says_where_an_effect_told_most() -> None:
             return {CHANNEL: np.zeros(N) if x is None else 9.0 * np.sin(30.0 * TIME + 6.0 * x)}
 
     every = tuple((round(0.02 * k, 2),) for k in range(12))
-    problem, base = judge_of((0.0, 0.0), (0.0, 0.0), first_impact=np.inf)
+    problem, base = problem_of((0.0, 0.0), (0.0, 0.0), first_impact=np.inf)
     simulator: Any = Turned(0.0)
     problem = Problem([replace(e, simulator=simulator) for e in problem.dataset])
     block = replace(base.blocks[0], residual=50.0 * np.sin(30.0 * TIME + 6.0 * 0.145))
@@ -186,10 +186,10 @@ def test_a_leader_on_few_recordings_is_tried_on_all(
         scores = {c.key: 40.0 if len(only) == SETTINGS.forward.runs.few else 5.0 for c in candidates}
         return ScoreTest(score=max(scores.values()), scores=scores, null=np.ones(10), detectable={})
 
-    monkeypatch.setattr(scan, "score_test", scored)
-    problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
+    monkeypatch.setattr(screening, "score_test", scored)
+    problem, base = problem_of((0.0,) * 4, (0.0,) * 4)
     problem.heavy_tailed = heavy_tailed
-    found = scan.score_candidates(problem, base, [SLOPE], [[r] for r in range(4)])
+    found = screening.score_candidates(problem, base, [SLOPE], [[r] for r in range(4)])
     assert found.scores["slope"] == kept
     assert found.score == 5.0  # what is claimed is claimed by all
 
@@ -206,12 +206,12 @@ def test_the_leader_of_the_robust_screening_is_tried_first(monkeypatch: pytest.M
         null = np.sort(np.random.default_rng(0).chisquare(1, 1000))
         return ScoreTest(score=max(scores.values()), scores=scores, null=null, detectable={})
 
-    monkeypatch.setattr(scan, "score_test", scored)
-    monkeypatch.setattr(scan, "strong_starts", lambda *_: {})
-    problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
+    monkeypatch.setattr(screening, "score_test", scored)
+    monkeypatch.setattr(screening, "strong_starts", lambda *_: {})
+    problem, base = problem_of((0.0,) * 4, (0.0,) * 4)
     problem.heavy_tailed, problem.effort = False, replace(problem.effort, leaders=3)
     every = [replace(SLOPE, id=f"c{k}", kind="sensor" if k == 9 else "parameter") for k in range(10)]
-    found = scan.score_candidates(problem, base, every, [[r] for r in range(4)])
+    found = screening.score_candidates(problem, base, every, [[r] for r in range(4)])
     assert not problem.heavy_tailed
     assert found.leading == ("c7", "c5")
     assert [c.key for c in found.ranked(every)][:5] == ["c7", "c5", "c0", "c1", "c2"]  # c7 is first of both
@@ -222,7 +222,7 @@ def test_the_leader_of_the_robust_screening_is_tried_first(monkeypatch: pytest.M
     assert all("c9" not in keys for heavy_tailed, keys in asked if heavy_tailed)
     problem.heavy_tailed = True
     asked.clear()
-    assert scan.score_candidates(problem, base, every, [[r] for r in range(4)]).leading == ()
+    assert screening.score_candidates(problem, base, every, [[r] for r in range(4)]).leading == ()
     assert len(asked) == 2
 
 
@@ -244,7 +244,7 @@ def test_some_that_move_the_vehicle_are_always_looked_at_closer() -> None:
 
 def test_directions_may_be_those_beside_another_fit() -> None:
     """The misfit of an explanation along what runs beside the base say, and no run is made but those that are known."""
-    problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    problem, base = problem_of((0.0,) * 4, (2.0,) * 4)
     wave = 2.0 * np.where(TIME < IMPACT, np.sin(30.0 * TIME), 0.0)
     left = tuple(replace(b, residual=b.residual - wave) for b in base.blocks)
     fitted = Fitted(candidates=(replace(SLOPE, id="other"),), x=(0.51,), blocks=left)
@@ -256,9 +256,9 @@ def test_directions_may_be_those_beside_another_fit() -> None:
     assert 0.0 < found.score < 0.1 * known.score  # most is explained
 
 
-@pytest.mark.parametrize(("hint", "is_ensemble", "looks_made"), [(0.9, True, 1), (0.01, True, 2), (0.9, False, 1)])
+@pytest.mark.parametrize(("hint", "is_ensemble", "scores_made"), [(0.9, True, 1), (0.01, True, 2), (0.9, False, 1)])
 def test_no_screening_beside_a_model_without_usable_runs(
-    hint: float, is_ensemble: bool, looks_made: int, monkeypatch: pytest.MonkeyPatch
+    hint: float, is_ensemble: bool, scores_made: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[tuple[Any, Any]] = []
 
@@ -275,22 +275,22 @@ def test_no_screening_beside_a_model_without_usable_runs(
         null = np.sort(np.random.default_rng(0).chisquare(1, 1000))
         return ScoreTest(score=float(np.quantile(null, 1.0 - hint)), scores={}, null=null, detectable={})
 
-    monkeypatch.setattr(scan, "score_candidates", scored)
-    problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    monkeypatch.setattr(screening, "score_candidates", scored)
+    problem, base = problem_of((0.0,) * 4, (2.0,) * 4)
     problem.effort = replace(problem.effort, is_ensemble=is_ensemble)
     first = ScoreTest(score=0.0, scores={}, null=np.zeros(10), detectable={}, only=(0, 2))
-    scan.rescored(problem, base, base, [SLOPE], [[r] for r in range(4)], first)
-    assert len(asked) == looks_made
+    screening.rescored(problem, base, base, [SLOPE], [[r] for r in range(4)], first)
+    assert len(asked) == scores_made
     assert asked[0] == ((base, (0, 2)) if is_ensemble else (None, ()))
-    if looks_made == 2:
+    if scores_made == 2:
         assert asked[1] == (None, ())
     asked.clear()
-    scan.rescored(problem, base, None, [SLOPE], [[r] for r in range(4)], first)  # where the rest is structured
+    screening.rescored(problem, base, None, [SLOPE], [[r] for r in range(4)], first)  # where the rest is structured
     assert asked == [(None, ())]
 
 
 def test_what_was_refuted_tells_nothing() -> None:
-    problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    problem, base = problem_of((0.0,) * 4, (2.0,) * 4)
     scored = score_test(problem, base, [SLOPE])
     before: Any = type("M", (), {"p_value": 0.3})()
     found = Explanation(base=base, fitted=base, parts=(), scored=scored, detectable={}, before=before, after=before)
@@ -307,12 +307,12 @@ def test_the_smaller_of_two_split_p_values_is_uniform(
     Where runs scatter (an expected sum of squares is known) the look is nearly always 1, and then nothing is added.
     """
     rng, draws = np.random.default_rng(3), 2000
-    base = judge_of((0.0,) * 4, (0.0,) * 4)[1]
+    base = problem_of((0.0,) * 4, (0.0,) * 4)[1]
     base = replace(base, blocks=tuple(replace(b, expected=expected) for b in base.blocks))
 
-    def told(before: float, look: float) -> float:
+    def told(before: float, scan: float) -> float:
         one: Any = SimpleNamespace(p_value=before)
-        other: Any = SimpleNamespace(p_value=lambda: look)
+        other: Any = SimpleNamespace(p_value=lambda: scan)
         found = Explanation(base=base, fitted=base, parts=(), scored=other, detectable={}, before=one, after=one)
         return found.p_value
 
@@ -326,7 +326,7 @@ def test_the_smaller_of_two_split_p_values_is_uniform(
 
 def test_a_limit_shows_up_to_the_largest_scan_point() -> None:
     """A force cell that ends at three quarters of its range shows, at more than the range it does not."""
-    problem = test_fits.judge_of(recorded({}, noise=0.01, speeds=(1.5, 2.5)))
+    problem = test_fits.problem_of(recorded({}, noise=0.01, speeds=(1.5, 2.5)))
     base = problem.fit((), ())
     assert base is not None
     cell = candidate(problem, f"sensor-clipping:{FORCE}")
@@ -343,7 +343,7 @@ def test_a_limit_shows_up_to_the_largest_scan_point() -> None:
     assert 0.0 < known < 0.1
 
 
-def test_a_look_goes_as_far_along_a_direction_as_gains_most() -> None:
+def test_a_scan_goes_as_far_along_a_direction_as_gains_most() -> None:
     """One recording took another course, which a direction explains altogether; the other one has a little of it."""
     rng = np.random.default_rng(2)
     n, expected, beyond = 60, 30.0, 900.0

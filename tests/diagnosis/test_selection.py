@@ -24,7 +24,7 @@ from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
-from tests.diagnosis.test_fits import judge_of
+from tests.diagnosis.test_fits import problem_of
 
 IDS = ("soil-crust", "guide-friction", "mass")
 
@@ -145,7 +145,7 @@ def test_a_maybe_null_effect_is_dropped_if_another_does_its_work(
     clock = {"channel": ACCELERATION, "offset": offset}
     changes = {f"effects.sensor-lag.{k}": v for k, v in lag.items()}
     changes |= {f"effects.sensor-clock-offset.{k}": v for k, v in clock.items()} if offset else {}
-    problem = judge_of(recorded(changes, speeds=(1.5, 2.5), channels=(FORCE, DEPTH, ACCELERATION), noise=0.001))
+    problem = problem_of(recorded(changes, speeds=(1.5, 2.5), channels=(FORCE, DEPTH, ACCELERATION), noise=0.001))
     estimate_time_shifts(problem)
     able = candidates_of(problem.dataset, (), "drop")
     both = [
@@ -258,7 +258,7 @@ def test_condition_errors_count_where_they_leave_chance_alone(
     found, again = step(1), step(2).fitted
     problem = cast(Problem, SimpleNamespace(dataset="as it is", with_noise_model=reweighted.append))
     monkeypatch.setattr(explanation, "has_uncertain_conditions", lambda _: True)
-    monkeypatch.setattr(explanation, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
+    monkeypatch.setattr(explanation, "is_enough", lambda _problem, _fit, what: what.p_value > 0.001)
     monkeypatch.setattr(explanation, "refitted_with_conditions", lambda *_: again)
     monkeypatch.setattr(explanation, "mismatch_of", lambda *_: left(beside))
     after, remaining = explanation.with_conditions_refitted(problem, found, left(1e-9), [])
@@ -300,7 +300,7 @@ def test_beside_a_resonance_the_other_of_a_pair_is_refitted(
     problem = SimpleNamespace(again=lambda f: f, dataset=())
     monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
     monkeypatch.setattr(pairs, "followed", lambda _, one: (one, left(p_value)))
-    monkeypatch.setattr(pairs, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
+    monkeypatch.setattr(pairs, "is_enough", lambda _problem, _fit, what: what.p_value > 0.001)
     monkeypatch.setattr(pairs, "with_first_replaced", swapped)
     monkeypatch.setattr(pairs, "with_noise_of_fit", lambda *_: False)
     asking = cast(Inquiry, SimpleNamespace(problem=problem, phases=()))

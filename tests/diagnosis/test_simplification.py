@@ -63,10 +63,10 @@ def test_rivals_restart_beside_the_best_models_variant() -> None:
         return [fitted(task.candidates[-1].id, 4.0, task.start) for task in tasks]
 
     best, rival = fitted("soil-layer", 1.0, (0.7, 0.0, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
-    bent = replace(rival.candidates[0], search={"a": Search(0, 1), "b": Search(0, 1)})
-    stood = replace(rival, candidates=(bent, rival.candidates[1]), x=(0.2, 0.5, 0.4))
+    curved = replace(rival.candidates[0], search={"a": Search(0, 1), "b": Search(0, 1)})
+    stood = replace(rival, candidates=(curved, rival.candidates[1]), x=(0.2, 0.5, 0.4))
     found = step(best, stood)
-    found = replace(found, base=replace(found.base, candidates=(bent,), x=(0.2, 0.5)))
+    found = replace(found, base=replace(found.base, candidates=(curved,), x=(0.2, 0.5)))
     there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[]))
     simplification._with_rivals(there, found)
     simplification.simpler(there, found)
@@ -124,7 +124,7 @@ def test_a_layer_is_tried_as_the_stiffness_that_it_becomes(leaves: float, taken:
 
 
 @pytest.mark.parametrize(("leaves", "straight"), [(9.0, ("first", "last")), (30.0, ("last",)), (99.0, ())])
-def test_what_was_bent_to_do_anothers_work_is_straight_beside_it(leaves: float, straight: tuple[str, ...]) -> None:
+def test_a_variant_that_did_anothers_work_is_usual_beside_it(leaves: float, straight: tuple[str, ...]) -> None:
     """A layer's width and a rate's reference speed, the one of which is needed where both at once leave far more."""
     layer = Candidate(id="soil-layer", kind="physics", family="", search={"depth": Search(0, 0.4)})
     rate = Candidate(id="soil-rate-hardening", kind="physics", family="", search={"per_decade": Search(0, 0.2)})

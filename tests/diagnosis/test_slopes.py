@@ -250,7 +250,7 @@ def test_runs_over_wider_steps_are_announced_too(is_helped: bool, monkeypatch: p
     assert not announced & {(0, 0.71 - 0.03), (0, 0.71 - 0.06)}
 
 
-def test_a_leap_to_another_course_on_one_side_is_no_slope() -> None:
+def test_a_jump_to_another_trajectory_on_one_side_is_no_slope() -> None:
     """y = a x sin(wt), and for x > 0.52 another course besides: dy/dx = a sin(wt), as the side below tells."""
 
     class Leaping(Late):
@@ -278,7 +278,7 @@ def test_where_an_effect_ends_its_slope_is_that_of_both_sides() -> None:
     assert found.J[:, 0] == pytest.approx(0.5 * np.sin(90.0 * TIME) / SIGMA, abs=0.01 / SIGMA)
 
 
-def test_what_tells_only_near_its_place_is_looked_at_over_less() -> None:
+def test_a_local_parameter_is_varied_over_less() -> None:
     """y = g(t - c (x - x0)), g = exp(-(t/w)^2) with w = 2 ms, c = 0.1 s: over 0.03 of a coordinate it is gone.
 
     sum (g(t + ch) - g(t - ch))^2 = 2 (1 - exp(-2 (ch/w)^2)) sum g^2, over (2h sigma)^2: with h a quarter of 0.03 that

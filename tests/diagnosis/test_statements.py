@@ -27,9 +27,9 @@ from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
 
 def test_a_limit_and_an_offset_are_in_the_unit_of_their_channel() -> None:
-    assert "2,840 N:" in SensorClipping(channel=FORCE, limit=2840.0).says()
-    assert "0.01 m" in SensorBias(channel=DEPTH, bias=0.01).says()
-    assert "1,000 N:" in SensorClipping(channel=FORCE, limit=999.7).says()
+    assert "2,840 N:" in SensorClipping(channel=FORCE, limit=2840.0).statement()
+    assert "0.01 m" in SensorBias(channel=DEPTH, bias=0.01).statement()
+    assert "1,000 N:" in SensorClipping(channel=FORCE, limit=999.7).statement()
     assert units_of(EFFECTS["sensor-bias"], ACCELERATION)["bias"] == "m/s2"
     assert units_of(EFFECTS["soil-layer"])["depth"] == "m"
 
@@ -61,7 +61,7 @@ def test_what_lies_within_a_tolerance_is_not_said_to_be_small() -> None:
         assert sentence("no-mismatch", (), 1e-9, nothing, nothing, [e]).endswith(ends)
 
 
-def test_what_runs_that_scatter_miss_is_told_before_the_blow_too() -> None:
+def test_what_scattering_runs_miss_before_the_impact_is_said() -> None:
     """3 and 4 times the noise before the impact, nearly nothing behind: sqrt((9 + 16)/2), whatever counts how much."""
     early = np.arange(80) < 40
     none: Any = {"J": np.zeros((80, 0)), "slope": np.zeros(80), "shift": 0.0, "prior": 1e-3}
@@ -80,7 +80,7 @@ def test_what_runs_that_scatter_miss_is_told_before_the_blow_too() -> None:
 
 
 @pytest.mark.parametrize(("told", "said"), [(11, None), (12, 3.0)])
-def test_of_few_samples_before_the_blow_nothing_is_said(told: int, said: float | None) -> None:
+def test_of_few_samples_before_the_impact_nothing_is_said(told: int, said: float | None) -> None:
     """Two recordings of so many samples before the impact, and as many at the start, which have no past: 24 in all."""
     early = np.arange(80) < 2 * told
     residual = np.where(np.arange(80) < told, 0.0, 3.0)
@@ -90,7 +90,7 @@ def test_of_few_samples_before_the_blow_nothing_is_said(told: int, said: float |
     assert misfit_before_impact(scattering, fitted) == said
 
 
-def test_a_misfit_with_scatter_or_a_remainder_is_reported() -> None:
+def test_a_misfit_with_scatter_or_unexplained_is_reported() -> None:
     first, last = (HeldOutMisfit(chi2=np.array([left]), count=np.ones(1)) for left in (1.44, 0.64))
     tilted = Named(
         id="slope", kind="parameter", statement="The ground is inclined.", parameters={}, settings={}, channel=None,
@@ -109,7 +109,7 @@ def test_a_misfit_with_scatter_or_a_remainder_is_reported() -> None:
     assert said.endswith("the misfit is 1.02 times the noise for 6.9.")
 
 
-def test_an_effect_whose_numbers_may_all_be_null_may_be_nothing() -> None:
+def test_an_effect_all_of_whose_intervals_hold_null_is_said() -> None:
     def effect(id: str, **ends: tuple[float, float]) -> Named:
         told = {p: Interval(value=0.5 * (a + b), low=a, high=b, unit="") for p, (a, b) in ends.items()}
         return Named(
@@ -137,7 +137,7 @@ def test_an_effect_whose_numbers_may_all_be_null_may_be_nothing() -> None:
     assert statements.interval_contains_null([faster, adhesion], True) == {"soil-adhesion"}
 
 
-def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_effect_that_is_named_is_no_rival_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
     def one(id: str) -> Any:
         return SimpleNamespace(id=id, key=id, kind="parameter", channel=None)
 

@@ -118,7 +118,7 @@ def test_null_of_the_best_is_that_of_simulated_noise() -> None:
     assert p_value(60.0, null) < 1e-10
 
 
-def test_freed_directions_are_measured_as_the_shift_leaves_them() -> None:
+def test_free_directions_are_measured_as_the_shift_leaves_them() -> None:
     rng = np.random.default_rng(4)
     b = linear_blocks(rng, 1, 30, np.array([0.0]))[0]
     v = rng.standard_normal((30, 1))

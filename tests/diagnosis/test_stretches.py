@@ -53,9 +53,9 @@ class Overturn:
     contact = float("inf")
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array]:
-        bent = sum(changes.values()) * np.sin(np.pi * TIME / IMPACT) ** 2 * ~LATE
+        curved = sum(changes.values()) * np.sin(np.pi * TIME / IMPACT) ** 2 * ~LATE
         course = 0.5 - 0.5 * np.cos(np.pi * TIME / TIME[-1])
-        return dict.fromkeys((ROLL, RATE), self.side * course + bent)
+        return dict.fromkeys((ROLL, RATE), self.side * course + curved)
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         return ((0.0, "tipping"), (IMPACT, "impact"))
@@ -159,7 +159,7 @@ def test_an_early_effect_shows_beside_a_late_difference() -> None:
 
 
 @pytest.mark.parametrize("sides", [(1.0, 1.0, 1.0, 1.0), (1.0, -1.0, 1.0, -1.0)])
-def test_references_teach_the_course_that_a_rig_repeats(sides: tuple[float, ...]) -> None:
+def test_references_teach_what_a_rig_repeats_over_time(sides: tuple[float, ...]) -> None:
     """Turned round with what is simulated; on either side of the impact by as much as others repeat it there."""
     same = wave(0, 0.01, 0.2)
     own = [wave(10 + k, 0.004, 0.02) for k in range(5)]
@@ -191,7 +191,7 @@ def test_what_references_do_not_repeat_is_not_taken_off() -> None:
 
 
 @pytest.mark.parametrize(("taught", "times"), [(0, 4.0), (4, 1.0 + 3.0 / 5.0), (10**9, 1.0)])
-def test_what_is_left_of_a_taught_course_is_new_each_time(taught: int, times: float) -> None:
+def test_what_is_left_of_what_is_taught_is_new_each_time(taught: int, times: float) -> None:
     """Of own errors of variance v and their mean of v/m off all: R draws are R/(1 + (R - 1)/(m + 1)) independent."""
     scales = {ROLL: 0.1, RATE: 0.1}
     problem = held_against(recorded([wave(0, 0.0, 0.0)] * 4), Discrepancy(scales=scales, taught_by=taught))

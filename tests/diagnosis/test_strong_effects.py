@@ -15,14 +15,14 @@ from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Inquiry
 from rollover.diagnosis.fit.tasks import Task
-from rollover.diagnosis.selection import scan
+from rollover.diagnosis.selection import screening
 from rollover.diagnosis.selection.forward_step import _robust_short_fits
 from rollover.diagnosis.selection.screening import screen
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from tests.diagnosis import test_ensemble
 from tests.diagnosis.test_ensemble import STEP
-from tests.diagnosis.test_scan import CHANNEL, SLOPE, TIME, N, Wave, judge_of
+from tests.diagnosis.test_scan import CHANNEL, SLOPE, TIME, N, Wave, problem_of
 
 
 class Tipping(Wave):
@@ -40,7 +40,7 @@ MASS = replace(SLOPE, id="mass", search={"factor": Search(-2.0, 2.0)})
 
 def tipped(size: float) -> tuple[Problem, Fitted]:
     """Four recordings of a vehicle that tipped, which moves them by so many times their noise, and the base."""
-    problem, base = judge_of((0.0,) * 4, (size,) * 4)
+    problem, base = problem_of((0.0,) * 4, (size,) * 4)
     for e in problem.dataset:
         object.__setattr__(e, "simulator", Tipping(size))
     problem.measured = [size * np.sin(30.0 * TIME) + w for w in np.random.default_rng(1).standard_normal((4, N))]
@@ -52,7 +52,7 @@ def tipped(size: float) -> tuple[Problem, Fitted]:
 def test_an_effect_that_shows_only_when_strong_is_found() -> None:
     problem, base = tipped(20.0)
     mass, groups = MASS, [[r] for r in range(4)]
-    found = scan.score_candidates(problem, base, [mass, SLOPE], groups)
+    found = screening.score_candidates(problem, base, [mass, SLOPE], groups)
     assert found.scores["mass"] > 100.0 * found.scores["slope"]
     assert found.far == {"slope": ((0.95,),)}  # a mass leaves 0.91^2 of it, more than is followed
     assert found.leading[0] == "slope"
@@ -65,18 +65,18 @@ def test_an_effect_that_shows_only_when_strong_is_found() -> None:
     assert screen(inquiry, base, [SLOPE], [0, 1], [0.0] * 4, replace(found, far={}))[0].starts != begun.starts
     problem.heavy_tailed = True
     assert (
-        scan.score_candidates(problem, base, [mass, SLOPE], groups).far == {}
+        screening.score_candidates(problem, base, [mass, SLOPE], groups).far == {}
     )  # of what perturbed runs so far, chance may be all
 
 
 def test_where_known_runs_must_do_no_strong_effect_is_tried() -> None:
     problem, base = tipped(20.0)
     groups = [[r] for r in range(4)]
-    scan.score_candidates(problem, base, [MASS, SLOPE], groups, base, [0, 1])
+    screening.score_candidates(problem, base, [MASS, SLOPE], groups, base, [0, 1])
     known = problem.simulations
-    assert scan.score_candidates(problem, base, [MASS, SLOPE], groups, base, [0, 1]).far == {}
+    assert screening.score_candidates(problem, base, [MASS, SLOPE], groups, base, [0, 1]).far == {}
     assert problem.simulations == known
-    assert list(scan.score_candidates(problem, base, [MASS, SLOPE], groups).far) == ["slope"]
+    assert list(screening.score_candidates(problem, base, [MASS, SLOPE], groups).far) == ["slope"]
     assert problem.simulations > known
 
 
@@ -85,15 +85,15 @@ def test_a_start_worse_on_the_worst_recording_is_dropped(monkeypatch: pytest.Mon
     problem, base = tipped(20.0)
     problem.measured[2] = 1.5 * problem.measured[2]
     asked: dict[int, set[float]] = {1: set(), 2: set()}
-    chi2_at = scan.chi2_at
+    chi2_at = screening.chi2_at
 
     def counted(problem: Problem, candidates: Any, x: Any, shifts: Any, use: Any) -> float | None:
         for r in use:
             asked[r] |= {round(float(v), 9) for v in x}
         return chi2_at(problem, candidates, x, shifts, use)
 
-    monkeypatch.setattr(scan, "chi2_at", counted)
-    assert scan.strong_starts(problem, base, [SLOPE], [1, 2]) == {"slope": ((0.95,),)}
+    monkeypatch.setattr(screening, "chi2_at", counted)
+    assert screening.strong_starts(problem, base, [SLOPE], [1, 2]) == {"slope": ((0.95,),)}
     assert asked[2] == {round(x, 9) for (x,) in SLOPE.strong()}
     assert asked[1] == {0.95}
 
@@ -105,9 +105,9 @@ def test_a_start_better_on_the_worst_recording_goes_to_all(
     def chi2_at(problem: Problem, candidates: Any, x: Any, *_: Any) -> float:
         return 10.0 if not x else 30.0 if x != (0.95,) else masked if problem.heavy_tailed else full
 
-    monkeypatch.setattr(scan, "chi2_at", chi2_at)
+    monkeypatch.setattr(screening, "chi2_at", chi2_at)
     problem, base = tipped(20.0)
-    assert scan.strong_starts(problem, base, [SLOPE], [1, 2]) == ({} if full == masked else {"slope": ((0.95,),)})
+    assert screening.strong_starts(problem, base, [SLOPE], [1, 2]) == ({} if full == masked else {"slope": ((0.95,),)})
 
 
 def test_a_strong_effect_is_fitted_robustly_compared_in_full() -> None:
@@ -178,7 +178,7 @@ def test_a_limit_starts_where_it_is_reached_despite_its_misfit() -> None:
     limit = Candidate(
         id="rops-plasticity", kind="physics", family="x", search={"yield_force": Search(0.0, 33.0)}, null=(null,)
     )  # fmt: skip
-    problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
+    problem, base = problem_of((0.0,) * 4, (0.0,) * 4)
     simulator: Any = Yielding(0.0)
     for e in problem.dataset:
         object.__setattr__(e, "simulator", simulator)
@@ -189,7 +189,7 @@ def test_a_limit_starts_where_it_is_reached_despite_its_misfit() -> None:
     inquiry = Inquiry(
         problem=problem, candidates=(limit,), groups=[], phases=[], say=lambda _: None, executor=Executor()
     )
-    scored = replace(scan.score_candidates(problem, base, [limit], [[r] for r in range(4)]), far={})
+    scored = replace(screening.score_candidates(problem, base, [limit], [[r] for r in range(4)]), far={})
     found = screen(inquiry, base, [limit], [0, 1], [0.0] * 4, scored)[0]
     nothing_yields = [x for x in limit.scan_points() if abs(x[0] - null) < 0.1]
     assert nothing_yields

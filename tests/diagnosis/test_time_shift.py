@@ -30,7 +30,7 @@ HARDPAN = {"effects.soil-layer.depth": 0.08, "effects.soil-layer.stiffness_ratio
 CRUST = {"effects.soil-crust.thickness": 0.06, "effects.soil-crust.stiffness_ratio": 0.75}
 
 
-def judge_of(changes: dict[str, object], *, late: float = 0.0, rate: float = 1000.0, noise: float = 0.003) -> Problem:
+def problem_of(changes: dict[str, object], *, late: float = 0.0, rate: float = 1000.0, noise: float = 0.003) -> Problem:
     """Three drops whose clocks are late by `late` more than `recorded` makes them by chance."""
     found: list[Dataset] = []
     for name, r in recorded(changes, 3, channels=(FORCE, DEPTH, ACCELERATION), rate=rate, noise=noise):
@@ -66,37 +66,37 @@ def known(problem: Problem, changes: dict[str, object]) -> np.ndarray:
 
 @pytest.mark.parametrize("missing", [HARDPAN, CRUST], ids=["hardpan", "crust"])
 def test_the_onset_is_not_biased_by_missing_physics(missing: dict[str, object]) -> None:
-    problem = judge_of(missing, late=0.5e-3)
+    problem = problem_of(missing, late=0.5e-3)
     truth = known(problem, missing)
     estimate_time_shifts(problem)
     base = problem.fit((), ())
     assert base is not None
-    bent = np.array([b.shift for b in base.blocks]) - truth
+    curved = np.array([b.shift for b in base.blocks]) - truth
     early = np.array([np.nan if v is None else v for v in shifts_from_contact(problem, (), ())]) - truth
-    assert np.abs(bent).max() > 0.6e-3  # a whole recording's shift eats part of it
+    assert np.abs(curved).max() > 0.6e-3  # a whole recording's shift eats part of it
     assert np.abs(early).max() < 0.25e-3
 
 
 @pytest.mark.parametrize("late", [-0.008, 0.013])
 def test_the_onset_of_contact_is_found_whatever_happens_then(late: float) -> None:
     """A striker that gives way rings from the first instant, and its recorder's clock has no zero."""
-    ringing = {"effects.structural-compliance.stiffness": 1.9e6, "effects.structural-compliance.damping": 1400.0}
-    problem = without_zero(judge_of(ringing, late=late))
+    oscillation = {"effects.structural-compliance.stiffness": 1.9e6, "effects.structural-compliance.damping": 1400.0}
+    problem = without_zero(problem_of(oscillation, late=late))
     estimate_time_shifts(problem)
     base = problem.fit((), ())
     assert base is not None
-    bent = np.array([b.shift for b in base.blocks]) - late
+    curved = np.array([b.shift for b in base.blocks]) - late
     early = np.array([np.nan if v is None else v for v in shifts_from_contact(problem, (), ())]) - late
-    assert np.abs(bent).max() > 2e-3
+    assert np.abs(curved).max() > 2e-3
     assert np.abs(early).max() < 1.3e-3  # the clocks themselves stray by half a millisecond
 
 
 def test_a_recording_that_begins_in_contact_has_no_onset() -> None:
-    assert shifts_from_contact(without_zero(judge_of({}), since=0.012), (), ()) == [None, None, None]
+    assert shifts_from_contact(without_zero(problem_of({}), since=0.012), (), ()) == [None, None, None]
 
 
 def test_a_large_offset_of_a_known_clock_is_not_believed() -> None:
-    problem = judge_of({}, late=5.0e-3)
+    problem = problem_of({}, late=5.0e-3)
     loose = []
     for e in problem.dataset:
         clock = replace(e.recording.clock, zero="unknown")
@@ -109,7 +109,7 @@ def test_a_large_offset_of_a_known_clock_is_not_believed() -> None:
 
 def test_the_slope_of_a_clock_is_that_of_the_simulation() -> None:
     """Against central differences of the model itself, in the smooth part of the loading."""
-    problem = judge_of({}, rate=500.0)
+    problem = problem_of({}, rate=500.0)
     block = problem.block(0, (), (), 0.0, 0.0)
     assert block is not None
     e = problem.dataset[0]
@@ -124,7 +124,7 @@ def test_the_slope_of_a_clock_is_that_of_the_simulation() -> None:
 
 def test_one_fall_serves_every_clock() -> None:
     """A shift, or a channel with a clock of its own, reads the same fall again; one far off makes it longer."""
-    e = judge_of({}).dataset[0]
+    e = problem_of({}).dataset[0]
     assert isinstance(e.simulator, DropSimulator)
     stiffer, scenario = {"effects.soil-stiffness.scale": 1.1}, e.simulator.model.scenario
     simulator = DropSimulator(scenario, e.recording)
@@ -149,7 +149,7 @@ def test_one_fall_serves_every_clock() -> None:
 
 def test_fits_from_two_places_end_at_one() -> None:
     """A soil a thousandth softer than its law: followed to its end, from wherever it began, a fit leaves the same."""
-    problem = judge_of({"effects.soil-stiffness.scale": 0.9987}, noise=0.0005)
+    problem = problem_of({"effects.soil-stiffness.scale": 0.9987}, noise=0.0005)
     candidate = {c.id: c for c in candidates_of(problem.dataset, (), "drop")}["soil-stiffness"]
     estimate_time_shifts(problem)
     ends = [problem.fit((candidate,), (start,)) for start in (0.40, 0.5, 0.62)]
@@ -160,7 +160,7 @@ def test_fits_from_two_places_end_at_one() -> None:
 
 def test_the_score_test_leads_to_where_the_effect_is() -> None:
     mild = {**HARDPAN, "effects.soil-layer.stiffness_ratio": 1.05}
-    problem = judge_of(mild)
+    problem = problem_of(mild)
     candidates = [c for c in candidates_of(problem.dataset, (), "drop") if c.id == "soil-layer"]
     shifts = known(problem, mild)
     base = problem.fit((), (), shifts=shifts.tolist(), rounds=0)
@@ -171,7 +171,7 @@ def test_the_score_test_leads_to_where_the_effect_is() -> None:
 
 
 def test_a_path_from_the_null_value_is_followed_linearly() -> None:
-    problem = judge_of({})
+    problem = problem_of({})
     by_id = {c.key: c for c in candidates_of(problem.dataset, (), "drop")}
     layer = by_id["soil-layer"]
     x = layer.scan_points()[0]
@@ -195,7 +195,7 @@ def one_late(problem: Problem, late: float) -> Problem:
 
 @pytest.mark.parametrize("late", [0.05, -0.03])
 def test_a_large_offset_is_estimated_by_alignment_of_the_run(late: float) -> None:
-    problem = one_late(judge_of({}), late)
+    problem = one_late(problem_of({}), late)
     base = problem.fit((), (), rounds=3)
     assert base is not None
     [(name, found)] = clock_outliers(problem, base)
@@ -207,7 +207,7 @@ def test_a_large_offset_is_estimated_by_alignment_of_the_run(late: float) -> Non
 
 @pytest.mark.parametrize("missing", [{}, HARDPAN, {"effects.soil-stiffness.scale": 2.0}])
 def test_no_clock_is_blamed_for_what_the_simulation_misses(missing: dict[str, object]) -> None:
-    problem = judge_of(missing)
+    problem = problem_of(missing)
     base = problem.fit((), (), rounds=3)
     assert base is not None
     assert clock_outliers(problem, base) == []
@@ -228,7 +228,7 @@ def cut_at(problem: Problem, until: float) -> Problem:
 @pytest.mark.parametrize(("until", "told"), [(0.18, [0.15]), (0.14, [])])
 def test_any_contact_gives_a_time_shift_and_none_gives_none(until: float, told: list[float]) -> None:
     """150 ms late: of 30 ms after it most samples come before all that is simulated at the stamps as they are."""
-    short = cut_at(one_late(judge_of({}), 0.15), until)
+    short = cut_at(one_late(problem_of({}), 0.15), until)
     base = short.fit((), (), rounds=3)
     assert base is not None
     assert [round(s, 2) for _, s in clock_outliers(short, base)] == told
@@ -237,7 +237,7 @@ def test_any_contact_gives_a_time_shift_and_none_gives_none(until: float, told: 
 @pytest.mark.parametrize("late", [0.4, -0.1, 7.0])
 def test_a_time_shift_is_estimated_beside_missing_physics(late: float) -> None:
     """What rests long before or after its impact is met by most samples at many a clock: 0.4 s was called 0.243."""
-    problem = one_late(judge_of({"effects.soil-viscous-damping.damping": 250.0}), late)
+    problem = one_late(problem_of({"effects.soil-viscous-damping.damping": 250.0}), late)
     base = problem.fit((), (), rounds=3)
     assert base is not None
     [(name, found)] = clock_outliers(problem, base)
@@ -247,7 +247,7 @@ def test_a_time_shift_is_estimated_beside_missing_physics(late: float) -> None:
 
 def test_what_is_at_rest_tells_no_time() -> None:
     """Recorded from 0.25 s after its contact on, by a clock 0.25 s early: most of it is met by any earlier one."""
-    problem = judge_of({})
+    problem = problem_of({})
     e = problem.dataset[1]
     rows = np.flatnonzero(e.recording.time > 0.25)
     kept = {c: v[rows] for c, v in e.recording.channels.items()}
@@ -267,7 +267,7 @@ def test_milliseconds_that_are_many_are_spoken_in_full() -> None:
 
 def test_a_channel_far_too_early_is_screened_in_full_runs_too() -> None:
     """An impact of 20 ms that one channel shows 30 ms early: what a millisecond would do has nothing to do with it."""
-    problem = judge_of(
+    problem = problem_of(
         {"effects.sensor-clock-offset.channel": ACCELERATION, "effects.sensor-clock-offset.offset": -0.03}
     )
     base = problem.fit((), (), rounds=3)

@@ -18,7 +18,7 @@ from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
 from rollover.diagnosis.pipeline import diagnose
 from rollover.diagnosis.prepared import prepared
-from rollover.diagnosis.selection import truncated_start
+from rollover.diagnosis.selection import stepwise
 from rollover.diagnosis.selection.stepwise import Taken
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
@@ -87,7 +87,7 @@ def test_a_truncated_fit_is_a_start_if_it_gains_much(
     base, asked = fit((), 40_000.0), []
     before, there = taken(base, fit((MASS,), 10_000.0)), taken(base, fit((LAYER, REBOUND), over_all))
 
-    def one_by_one(asking: Inquiry, no_jacobian: Fitted, begun: Any = (), *, pairs: bool = True) -> Taken:
+    def selected(asking: Inquiry, no_jacobian: Fitted, begun: Any = (), *, pairs: bool = True) -> Taken:
         asked.append([s.fitted.candidates[-1].id for s in begun])
         whole = asking.problem.dataset == ["whole"]
         assert pairs == whole, "all pairs over all that was recorded alone"
@@ -98,42 +98,40 @@ def test_a_truncated_fit_is_a_start_if_it_gains_much(
         dataset=["whole"], effort=SETTINGS.forward.drops, simulations=3, with_noise_model=reweighted.append
     )
     early = SimpleNamespace(dataset=["cut"], fit=lambda *_: fit((), 900.0), simulations=4)
-    monkeypatch.setattr(truncated_start, "_cut", lambda *_: "cut")
-    monkeypatch.setattr(truncated_start, "Problem", lambda _: early)
-    monkeypatch.setattr(truncated_start, "estimate_time_shifts", lambda _: None)
-    monkeypatch.setattr(truncated_start, "forward_selection", one_by_one)
+    monkeypatch.setattr(stepwise, "_cut", lambda *_: "cut")
+    monkeypatch.setattr(stepwise, "Problem", lambda _: early)
+    monkeypatch.setattr(stepwise, "estimate_time_shifts", lambda _: None)
+    monkeypatch.setattr(stepwise, "forward_selection", selected)
     back = {"moves": np.inf}
-    monkeypatch.setattr(truncated_start, "rebound_residual", lambda *_: back["moves"])
+    monkeypatch.setattr(stepwise, "rebound_residual", lambda *_: back["moves"])
     whole = Inquiry(
         problem=cast(Any, problem), candidates=(), groups=[], phases=[()], say=lambda _: None,
         executor=cast(Any, SimpleNamespace(fits=lambda _, tasks, __: [fit(j.candidates, 5_000.0) for j in tasks])),
     )  # fmt: skip
-    found = truncated_start.loading_first(whole, before)
+    found = stepwise.loading_first(whole, before)
     assert found is (there if better else before)
     ways = [[], ["soil-layer"], ["soil-elastic-rebound"], ["soil-elastic-rebound"]]
     assert asked == ways[: 4 if above < 60.0 else 1], "the way down, as it springs back, the first rise, the whole"
     assert problem.simulations == (15 if above < 60.0 else 7)
     assert reweighted == ([["whole"]] if over_all > 900.0 else []), "as it was before a way that led nowhere"
     little = taken(base, fit((MASS,), 60.0))
-    assert truncated_start.loading_first(whole, little) is little
+    assert stepwise.loading_first(whole, little) is little
     back["moves"] = 50.0
-    assert truncated_start.loading_first(whole, before) is before, (
-        "what rests as simulated is no reason for ten thousand"
-    )
+    assert stepwise.loading_first(whole, before) is before, "what rests as simulated is no reason for ten thousand"
 
 
-def test_the_way_down_ends_before_the_deepest_point() -> None:
+def test_the_loading_ends_before_the_deepest_point() -> None:
     dataset, _ = prepared(load("drop_test"), recordings({}), Executor())
     phases = drop_phases(dataset[0])
-    cut = truncated_start._cut(dataset[0], phases, 0.9)
+    cut = stepwise._cut(dataset[0], phases, 0.9)
     assert cut is not None
     deepest = descend(Rig(speed=SPEEDS[0]), -0.1, 0.8).deepest()[0]
     for before, after in zip(dataset[0].signals, cut.signals, strict=True):
         last = dataset[0].recording.time[after.rows[-1]]
         assert 0.8 * deepest < last < deepest
         np.testing.assert_array_equal(before.values[: after.rows.size], after.values)
-    assert truncated_start._cut(dataset[0], ((-0.05, "approach"),), 0.9) is None
-    assert truncated_start._cut(dataset[0], ((-0.05, "free-fall"), (-0.045, "peak")), 0.9) is None, "five samples"
+    assert stepwise._cut(dataset[0], ((-0.05, "approach"),), 0.9) is None
+    assert stepwise._cut(dataset[0], ((-0.05, "free-fall"), (-0.045, "peak")), 0.9) is None, "five samples"
 
 
 @pytest.mark.parametrize(
@@ -152,12 +150,12 @@ def test_holding_ground_moves_nothing_during_unloading(rig: dict[str, float], is
     phases = [drop_phases(e) for e in dataset]
     asking = Inquiry(problem=problem, candidates=(), groups=[], phases=phases, say=lambda _: None, executor=Executor())
     beyond = base.chi2 - sum(b.residual.size for b in base.blocks)
-    moved = truncated_start.rebound_residual(asking, base)
+    moved = stepwise.rebound_residual(asking, base)
     assert (
         moved > 0.1 * beyond if is_back else abs(moved) < 0.1 * SETTINGS.selection.truncated_start.least_share * beyond
     )
-    early = [truncated_start._cut(e, p, truncated_start.TRUNCATIONS[0]) for e, p in zip(dataset, phases, strict=True)]
+    early = [stepwise._cut(e, p, stepwise.TRUNCATIONS[0]) for e, p in zip(dataset, phases, strict=True)]
     cut = Problem([e for e in early if e is not None])
     above = cut.fit((), ())
     assert above is not None
-    assert truncated_start.rebound_residual(replace(asking, problem=cut), above) == np.inf, "nothing tells of it"
+    assert stepwise.rebound_residual(replace(asking, problem=cut), above) == np.inf, "nothing tells of it"

@@ -17,7 +17,7 @@ from rollover.diagnosis.fit.step import Inquiry
 from rollover.diagnosis.forward.averaging import Averaged
 from rollover.diagnosis.forward.full_run import RunSimulator
 from rollover.diagnosis.noise.truncation import shortened, shortly_after_impact, truncation_notes, up_to
-from rollover.diagnosis.selection import forward_step, scan
+from rollover.diagnosis.selection import forward_step, screening
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
@@ -92,17 +92,17 @@ def test_an_end_that_counts_is_kept() -> None:
     assert shortened(replace(plain, signals=(replace(plain.signals[0], weight=None),))).recording.time.size == 1000
 
 
-@pytest.mark.parametrize(("off", "is_kept"), [(0.0, False), (1.5, False), (2.5, True)])
-def test_a_light_end_is_kept_where_it_differs_significantly(off: float, is_kept: bool) -> None:
+@pytest.mark.parametrize(("off", "stays"), [(0.0, False), (1.5, False), (2.5, True)])
+def test_a_light_end_stays_where_it_differs_significantly(off: float, stays: bool) -> None:
     """Samples of noise 1 that count 0.3, of runs that differ by 1: (0.3 off)^2 against 3 (0.3^2 + 0.3^2)."""
     whole = dataset(0.3, off=off)
     one = np.ones(whole.signals[0].rows.size)
     even = replace(whole.signals[0], level=one)
     found = shortened(replace(whole, signals=(even,), perturbed=(one, -one)))
-    assert (found.recording.time.size == whole.recording.time.size) == is_kept
+    assert (found.recording.time.size == whole.recording.time.size) == stays
 
 
-def test_of_one_recording_alone_nothing_after_the_blow_counts() -> None:
+def test_of_one_recording_nothing_after_the_impact_counts() -> None:
     whole = dataset(0.9)
     found = shortened(whole, alone=True)
     assert found.recording.time[-1] == pytest.approx(IMPACT, abs=STEP)
@@ -110,7 +110,7 @@ def test_of_one_recording_alone_nothing_after_the_blow_counts() -> None:
     assert shortened(without, alone=True) is without
 
 
-def test_a_truncated_run_is_the_same_and_its_filter_looks_ahead() -> None:
+def test_a_truncated_run_is_the_same_and_its_filter_runs_on() -> None:
     whole = dataset(0.3, cfc=60)
     found = shortened(whole)
     assert isinstance(found.simulator, RunSimulator)
@@ -212,8 +212,8 @@ def test_screening_and_first_fits_are_truncated_final_fits_not(monkeypatch: pyte
         asked.append(("look", problem, base.blocks[0].residual.size))
         return ScoreTest(score=0.0, scores={}, null=np.zeros(10), detectable={})
 
-    monkeypatch.setattr(scan, "score_test", gated)
-    scored = scan.score_candidates(problem, base, [], [[0], [1]])
+    monkeypatch.setattr(screening, "score_test", gated)
+    scored = screening.score_candidates(problem, base, [], [[0], [1]])
 
     def screened(inquiry: Inquiry, base: Fitted, *_: object) -> list[Any]:
         asked.append(("screen", inquiry.problem, base.blocks[0].residual.size))

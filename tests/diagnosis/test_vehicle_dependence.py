@@ -78,7 +78,7 @@ def test_samples_count_for_what_they_count_in_the_fit(weight: float) -> None:
     assert (found.get("chassis/velocity_z", 0.0) > 0.9) == (weight == 0.0)
 
 
-def test_columns_count_after_another_course_as_the_misfit_does() -> None:
+def test_columns_of_diverged_runs_count_as_the_misfit_does() -> None:
     problem, base = judged([thrown(v, {ALONG[1]: f"4.0 * {FALLING}"})[1] for v in SPEEDS])
     blocks = []
     for e, b in zip(problem.dataset, base.blocks, strict=True):

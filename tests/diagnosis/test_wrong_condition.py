@@ -9,8 +9,8 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import Dataset, dataset_of
+from rollover.diagnosis.data.inconsistent import wrong_conditions
 from rollover.diagnosis.forward.forward_model import simulator_of
-from rollover.diagnosis.inference.wrong_condition import wrong_conditions
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -38,7 +38,7 @@ def dataset(made: Recordings) -> list[Dataset]:
 
 @pytest.mark.parametrize("missing", [{}, DAMPING, {"effects.impact-speed.scale": 1.15}])
 @pytest.mark.parametrize(("which", "times"), [(1, 1.5), (4, 0.7), (0, 1.3)])
-def test_the_speed_that_was_dropped_at_is_told(missing: dict[str, Any], which: int, times: float) -> None:
+def test_the_speed_of_a_wrong_drop_is_estimated(missing: dict[str, Any], which: int, times: float) -> None:
     """Beside what is missing too, and to what that bends it: a tenth."""
     every = dataset(stating(drops(missing), which, times))
     [found] = wrong_conditions(every)

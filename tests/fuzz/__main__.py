@@ -1,6 +1,6 @@
-"""Inputs by the thousand over all doors: `python -m tests.fuzz --inputs 100000 --seed 1`.
+"""Inputs by the thousand over all entry points: `python -m tests.fuzz --inputs 100000 --seed 1`.
 
-The same seed gives the same inputs. Prints figures by door and class; each find of another kind is kept.
+The same seed gives the same inputs. Prints figures by entry point and class; each find of another kind is kept.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     parser.add_argument("--inputs", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--door", action="append", default=[], help="only doors whose name holds this; may be repeated")
+    parser.add_argument(
+        "--entry-point", action="append", default=[], help="only those whose name holds this; may be repeated"
+    )
     parser.add_argument("--keep", type=Path, help="folder for one input of each kind of find")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so much wall time")
     given = parser.parse_args()
@@ -26,7 +28,7 @@ def main() -> int:
             Path(folder),
             given.inputs,
             given.seed,
-            only=given.door,
+            only=given.entry_point,
             keep=given.keep,
             seconds=given.seconds,
             say=sys.stderr,

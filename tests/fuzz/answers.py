@@ -1,11 +1,11 @@
-"""The doors of commands that answer from a scenario or from code of one's own, and of signals that drive a run."""
+"""Entry points of commands that answer from a scenario or code of one's own, and of signals that drive a run."""
 
 from __future__ import annotations
 
 import random
 
 from tests.fuzz import code, seeds
-from tests.fuzz.doors import OUT, Door, Seed
+from tests.fuzz.entry_points import OUT, EntryPoint, Seed
 from tests.fuzz.seeds import Files
 
 DRIVEN = ("tilt_table_recorded", "shaken_platform", "cornering_overturn")
@@ -21,7 +21,7 @@ channels: {t: {channel: time, unit: s}, F: {channel: input/table/angle, unit: de
 """
 
 
-def signals() -> Door:
+def signals() -> EntryPoint:
     """Scenarios that recorded signals drive, and the files of those signals."""
     root = seeds.shipped_folder()
     whole = seeds.scenarios(*DRIVEN)
@@ -45,20 +45,20 @@ def signals() -> Door:
             odd=odd,
         )
     )
-    return Door(name="signals", seeds=made, weight=1.0)
+    return EntryPoint(name="signals", seeds=made, weight=1.0)
 
 
-def own_code() -> Door:
+def own_code() -> EntryPoint:
     """Models in Python files of one's own, and what drives them; laws and effects would stay with this process."""
     words = ["diagnose", "--model", "own.py", "r1.csv", "r2.csv", "--workers", "0", *OUT]
     made = [
         Seed(name="model", files=code.model(), words=words, odd=code.model),
         Seed(name="recording", files=code.model(), words=words, touched=("r1.csv", "r1.yaml"), weight=0.5),
     ]
-    return Door(name="own code", seeds=made, weight=0.6)
+    return EntryPoint(name="own code", seeds=made, weight=0.6)
 
 
-def answers() -> Door:
+def answers() -> EntryPoint:
     """Plans, rolling, frames and templates, by words and by files."""
     whole = seeds.scenarios("drop_test", "side_overturn")
     # no such effect: a plan ends where its words are read, before it is worked out
@@ -94,4 +94,4 @@ def answers() -> Door:
         Seed(name="rops speed", files=frames, words=[*rops, "--speed", "1.0"], vary=(9,), weight=0.5),
         Seed(name="new", files={}, words=["new", "scenario", "out/mine"], vary=(1,), weight=0.5),
     ]
-    return Door(name="plan, rolling, rops, new", seeds=made, weight=1.5)
+    return EntryPoint(name="plan, rolling, rops, new", seeds=made, weight=1.5)

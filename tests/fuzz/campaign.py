@@ -1,4 +1,4 @@
-"""A campaign: inputs drawn over the doors, each judged, finds counted by door, class and kind."""
+"""A campaign: inputs drawn over the entry points, each judged, finds counted by entry point, class and kind."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pathlib import Path
 from time import perf_counter
 from typing import TextIO
 
-from tests.fuzz.all_doors import doors
-from tests.fuzz.doors import Door, Seed, an_input
+from tests.fuzz.all_entry_points import entry_points
+from tests.fuzz.entry_points import EntryPoint, Seed, an_input
 from tests.fuzz.oracle import CLASSES, Verdict, judge
 
 
 @dataclass(kw_only=True)
 class Done:
-    """What came of a campaign. `finds`: door -> class -> how often; `kinds`: (class, kind) -> how often, the first."""
+    """What came of it. `finds`: entry point -> class -> how often; `kinds`: (class, kind) -> count, the first."""
 
     inputs: Counter[str] = field(default_factory=Counter)
     statuses: dict[str, Counter[int | None]] = field(default_factory=lambda: defaultdict(Counter))
@@ -84,22 +84,22 @@ def campaign(
 ) -> Done:
     """Judge so many inputs; the same seed draws the same ones. `keep` gets one input of each kind of find."""
     (folder / "made").mkdir()
-    chosen = [d for d in doors(folder / "made") if not only or any(o in d.name for o in only)]
+    chosen = [d for d in entry_points(folder / "made") if not only or any(o in d.name for o in only)]
     rng = random.Random(seed)
     done, began = Done(), perf_counter()
     places: dict[tuple[str, int], Place] = {}
     for k in range(inputs):
         if perf_counter() - began > seconds:
             break
-        # every door once before the draw, so that none is left out of a short campaign
-        door: Door = chosen[k] if k < len(chosen) else rng.choices(chosen, [d.weight for d in chosen])[0]
-        at = rng.choices(range(len(door.seeds)), [s.weight for s in door.seeds])[0]
-        key = (door.name, at)
+        # every entry point once before the draw, so that none is left out of a short campaign
+        entry_point: EntryPoint = chosen[k] if k < len(chosen) else rng.choices(chosen, [d.weight for d in chosen])[0]
+        at = rng.choices(range(len(entry_point.seeds)), [s.weight for s in entry_point.seeds])[0]
+        key = (entry_point.name, at)
         if key not in places:
-            places[key] = Place(folder / f"seed{len(places)}", door.seeds[at])
+            places[key] = Place(folder / f"seed{len(places)}", entry_point.seeds[at])
             places[key].unchanged()
         verdict, files, words = places[key].judged(rng)
-        _count(done, door, door.seeds[at], verdict, words, keep, files)
+        _count(done, entry_point, entry_point.seeds[at], verdict, words, keep, files)
         if say is not None and (k + 1) % 500 == 0:
             total = sum(sum(c.values()) for c in done.finds.values())
             print(
@@ -111,16 +111,22 @@ def campaign(
 
 
 def _count(
-    done: Done, door: Door, seed: Seed, verdict: Verdict, words: list[str], keep: Path | None, files: dict[str, bytes]
+    done: Done,
+    entry_point: EntryPoint,
+    seed: Seed,
+    verdict: Verdict,
+    words: list[str],
+    keep: Path | None,
+    files: dict[str, bytes],
 ) -> None:
-    done.inputs[door.name] += 1
-    done.statuses[door.name][verdict.status] += 1
-    done.seconds[door.name] += verdict.seconds  # type: ignore[assignment]
+    done.inputs[entry_point.name] += 1
+    done.statuses[entry_point.name][verdict.status] += 1
+    done.seconds[entry_point.name] += verdict.seconds  # type: ignore[assignment]
     done.longest = max(done.longest, verdict.seconds)
     done.largest = max(done.largest, verdict.memory)
     for kind, what in verdict.finds:
-        done.finds[door.name][kind] += 1
-        times, first, said = done.kinds.get((kind, what), (0, f"{door.name}, {seed.name}", verdict.said[-400:]))
+        done.finds[entry_point.name][kind] += 1
+        times, first, said = done.kinds.get((kind, what), (0, f"{entry_point.name}, {seed.name}", verdict.said[-400:]))
         done.kinds[kind, what] = (times + 1, first, said)
         if times == 0 and keep is not None:
             place = keep / f"{len(done.kinds):03d}-{kind}"
@@ -131,8 +137,10 @@ def _count(
 
 
 def report(done: Done) -> str:
-    """Figures by door and class, and every kind of find."""
-    lines = [f"{'door':<24}{'inputs':>8}{'s':>8}{'read':>8}{'refused':>8}" + "".join(f"{c:>11}" for c in CLASSES)]
+    """Figures by entry point and class, and every kind of find."""
+    lines = [
+        f"{'entry point':<24}{'inputs':>8}{'s':>8}{'read':>8}{'refused':>8}" + "".join(f"{c:>11}" for c in CLASSES)
+    ]
     for name, count in done.inputs.items():
         status = done.statuses[name]
         lines.append(

@@ -1,4 +1,4 @@
-"""Two thousand inputs over all doors: each refused in whole lines or done, and nothing else happens."""
+"""Two thousand inputs over all entry points: each refused in whole lines or done, and nothing else happens."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rollover.recording.importers import COLLECTIONS, importers
-from tests.fuzz.all_doors import doors
+from tests.fuzz.all_entry_points import entry_points
 from tests.fuzz.campaign import campaign, report
 from tests.fuzz.oracle import command, is_whole, judge
 from tests.rollover.foreign import needs
@@ -29,9 +29,9 @@ def test_two_thousand_inputs(tmp_path: Path) -> None:
     assert not done.kinds, report(done)
 
 
-def test_every_command_and_reader_has_a_door(tmp_path: Path) -> None:
+def test_every_command_and_reader_has_an_entry_point(tmp_path: Path) -> None:
     """One that is added later is fuzzed from its first day on, or this says so."""
-    all_of_them = doors(tmp_path)
+    all_of_them = entry_points(tmp_path)
     names = {d.name for d in all_of_them}
     assert {f"importer {n}" for n in importers() if n not in ("plain", "csv")} <= names
     assert {f"set {n}" for n in COLLECTIONS} <= names
@@ -57,7 +57,7 @@ def test_what_a_whole_line_is(line: str, lacks: str) -> None:
     assert bool(is_whole(line)) == bool(lacks)
 
 
-def test_the_judge_sees_what_it_is_to_see(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_oracle_sees_what_it_is_to_see(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from rollover.cli import catalogue
     from tests.fuzz import oracle
 

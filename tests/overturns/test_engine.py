@@ -55,7 +55,7 @@ def test_it_has_the_tractors_mass_centre_and_inertia() -> None:
     assert np.diag(J) == pytest.approx(np.array(whole.inertia), rel=1e-6)
 
 
-def test_up_to_the_first_blow_both_engines_move_alike() -> None:
+def test_up_to_the_first_impact_both_engines_move_alike() -> None:
     """Tyres that do not give sideways make roll and its rate differ by about a tenth in a quarter of a second."""
     of = scenario()
     ours, theirs = run(of).recording, overturn(of)

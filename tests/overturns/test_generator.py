@@ -25,7 +25,7 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """As little as shows what a case is made of."""
     monkeypatch.setattr(generator, "STEP", 1e-3)
     monkeypatch.setattr(generator, "LENGTH", 0.2)
-    monkeypatch.setattr(generator, "NEIGHBOURS", 1)
+    monkeypatch.setattr(generator, "PERTURBED_RUNS", 1)
 
 
 def written(order: Order, folder: Path) -> Scenario:

@@ -1,4 +1,4 @@
-"""A trailer on its hitch and a wheel on its spring: energies, static loads, a pendulum's period, a quarter car."""
+"""A trailer on its hitch, a wheel on its spring, a bogie on its pin: energies, static loads, periods, a quarter car."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ from rollover.dynamics.result import Run
 from rollover.dynamics.setup import set_up
 from rollover.kernels import links as k
 from rollover.kernels.forces import generalised_forces
-from rollover.kernels.tables import handle
+from rollover.kernels.tables import E_FORCE_NOW, handle
 from rollover.scenario import Ground, Scenario, Simulation, load
+from rollover.spec.bogie import Bogie
 from rollover.spec.frames import from_quaternion
 from rollover.spec.inertia import MassProperties
 from rollover.spec.initiation import Drop
@@ -40,7 +41,7 @@ def test_forces_are_the_slope_of_what_the_links_hold(name: str) -> None:
     """Q = -dU/dq of hitches beyond and within their stops, of struts with preload and stops, at poses by chance."""
     bodies, t, q = laid_out(load(name))
     chance = np.random.default_rng(5)
-    free = [b for b, body in enumerate(bodies) if body.name.startswith(("trailer", "hub_"))]
+    free = [b for b, body in enumerate(bodies) if body.name.startswith(("trailer", "bogie_", "hub_"))]
     for _ in range(6):
         pose = q.copy()
         for b in free:
@@ -206,3 +207,120 @@ def test_wheels_that_nothing_carries_are_refused() -> None:
     wheel = replace(vehicle.wheels[-1], suspension=Suspension(mass=20.0, stiffness=2e4))
     with pytest.raises(ValueError, match="suspension: got it on 'trailer'"):
         replace(vehicle, wheels=(*vehicle.wheels[:-1], wheel))
+
+
+# ---------------------------------------------------------------- bogies
+
+
+def bogied(ahead: float = 0.7, behind: float = 0.7, **changes: Any) -> Scenario:
+    """A mass of 900 kg on two wheels in front and on two bogies behind, whose pins are `ahead` and `behind` of wheels.
+
+    Its wheels roll freely, so that nothing but what they bear turns a beam about its pin.
+    """
+    tyre = Tyre(radius=0.4, width=0.2, vertical_stiffness=3e5, vertical_damping=500.0, lateral_stiffness=2e5)
+    wheels = [
+        Wheel(name=f"front_{side}", centre=(2.7, y, 0.4), rolls=True, tyre=tyre)
+        for side, y in (("l", 0.8), ("r", -0.8))
+    ]
+    bogies = []
+    for side, y in (("l", 0.8), ("r", -0.8)):
+        beam = MassProperties(mass=40.0, centre_of_mass=(0.0, y, 0.4), inertia=(2.0, 12.0, 12.0))
+        bogies.append(Bogie(name=side, pivot=(0.0, y, 0.4), body=beam))
+        for word, x in (("middle", ahead), ("rear", -behind)):
+            wheels.append(Wheel(name=f"{word}_{side}", centre=(x, y, 0.4), rolls=True, tyre=tyre, bogie=side))
+    vehicle = Vehicle(
+        name="bogied",
+        whole=MassProperties(mass=980.0, centre_of_mass=(0.9, 0.0, 0.8), inertia=(300.0, 800.0, 900.0)),
+        wheels=tuple(wheels),
+        bogies=tuple(bogies),
+    )
+    found = load("side_overturn").replaced({"vehicle": vehicle, "initiation": {"kind": "standing"}})
+    return found.replaced(changes)
+
+
+def bearing(scenario: Scenario) -> tuple[dict[str, float], dict[str, Array]]:
+    """What the ground bears under each wheel, N, and where bodies are, (6,), of a vehicle that stands."""
+    rig = set_up(scenario)
+    q = rig.start.q
+    generalised_forces(handle(rig.tables), q, np.zeros_like(q), np.zeros_like(q))
+    names = [w.name for w in scenario.vehicle.wheels]
+    force = {n: float(f) for n, f in zip(names, rig.tables.wheel_memory[:, E_FORCE_NOW], strict=True)}
+    return force, {b.name: q[6 * i : 6 * i + 6] for i, b in enumerate(rig.bodies)}
+
+
+STEP = {"kind": "kerb", "height": 0.15, "face_deg": 60.0, "foot": [0.0, 0.0], "direction_deg": 0.0}
+
+
+@pytest.mark.parametrize("ahead", [0.7, 0.5])
+@pytest.mark.parametrize("step", [False, True])
+def test_a_bogies_wheels_share_by_the_lever(ahead: float, step: bool) -> None:
+    """N_m a = N_r b on a pin without friction, on the flat and with the wheel ahead 0.15 m higher.
+
+    The beam then leans by asin(0.15/(a + b)); what the tyres give differs by (N_m - N_r)/k, 3 mm at most.
+    """
+    scenario = bogied(ahead, 1.4 - ahead, **({"ground.surface": STEP} if step else {}))
+    force, q = bearing(scenario)
+    a, b = ahead, 1.4 - ahead
+    for side in "lr":
+        middle, rear = force[f"middle_{side}"], force[f"rear_{side}"]
+        assert middle * a == pytest.approx(rear * b, rel=1e-6)
+        sunk = (middle - rear) / 3e5
+        lean = -math.asin(((0.15 if step else 0.0) - sunk) / 1.4)
+        assert q[f"bogie_{side}"][4] == pytest.approx(lean, abs=2e-3)
+    assert sum(force.values()) == pytest.approx(980.0 * 9.81, rel=1e-6)
+
+
+def test_without_a_bogie_the_wheel_on_the_step_bears_alone() -> None:
+    """What the bogie is for: the same wheels on the chassis, of which the higher one carries all of its side."""
+    vehicle = bogied().vehicle
+    assert isinstance(vehicle, Vehicle)
+    rigid = replace(vehicle, bogies=(), wheels=tuple(replace(w, bogie=None) for w in vehicle.wheels))
+    force, _ = bearing(bogied(**{"vehicle": rigid, "ground.surface": STEP}))
+    assert force["rear_l"] == 0.0
+    assert force["middle_l"] > 1000.0
+
+
+@pytest.mark.parametrize("integrator", ["compiled", "exudyn"])
+def test_a_bogie_swings_as_a_pendulum(integrator: str) -> None:
+    """T = 2 pi sqrt((I + m l^2)/(m g l)) (1 + A^2/16) about its pin, let go at A = 0.1 rad, its wheels in the air."""
+    A, mass, arm, inertia = 0.1, 500.0, 0.4, 60.0
+    centre = (4.0 + arm * math.sin(A), 1.5, 2.0 - arm * math.cos(A))
+    beam = MassProperties(mass=mass, centre_of_mass=centre, inertia=(40.0, inertia, 60.0))
+    tyre = Tyre(radius=0.4, width=0.2, vertical_stiffness=3e5, lateral_stiffness=2e5)
+    hung = Bogie(name="left", pivot=(4.0, 1.5, 2.0), body=beam)
+    on = [Wheel(name=f"w{i}", centre=(4.0 + x, 1.5, 2.0), tyre=tyre, bogie="left") for i, x in enumerate((0.6, -0.6))]
+    scenario = tower(bogies=(hung,), wheels=tuple(on))
+    done = simulate.run(scenario.replaced({"simulation.integrator": integrator}))
+    period = 2.0 * math.pi * math.sqrt((inertia + mass * arm**2) / (mass * 9.80665 * arm)) * (1.0 + A * A / 16.0)
+    angle, time = done.recording["bogie/left/angle"], done.recording.time
+    rest = np.abs(angle - angle[0])
+    assert float(time[int(np.argmax(rest))]) == pytest.approx(0.5 * period, abs=0.004)
+    assert rest.max() == pytest.approx(2.0 * A, rel=2e-3)
+    assert done.recording["bogie/left/force"][-300:].mean() == pytest.approx(mass * G, rel=0.02)
+    assert closure(done).largest < 1e-3
+
+
+def test_a_bogie_meets_its_stop() -> None:
+    """M = k_s (a - swing) on both bodies, 0.05 rad beyond; nothing within the swing."""
+    for way, beyond in ((0.2, 0.0), (math.radians(15.0) + 0.05, 0.05), (-math.radians(15.0) - 0.05, -0.05)):
+        _, t, q = laid_out(bogied())
+        q[6 + 4] = way  # the bogie on the left is the second body
+        tried(t, q)
+        assert t.link_memory[0, k.L_MOMENT + 1] == pytest.approx(-1e6 * beyond, rel=1e-6, abs=1e-3)
+
+
+def test_bogies_that_cannot_swing_are_refused() -> None:
+    vehicle = bogied().vehicle
+    assert isinstance(vehicle, Vehicle)
+    with pytest.raises(ValueError, match=r"wheels: a wheel stands on bogie 'l', got \['r'\]"):
+        replace(vehicle, bogies=vehicle.bogies[1:])
+    with pytest.raises(ValueError, match=r"bogies.l.pivot: its beam falls over, got wheels at .* one ahead of it"):
+        replace(vehicle, bogies=(replace(vehicle.bogies[0], pivot=(1.0, 0.8, 0.4)), vehicle.bogies[1]))
+    sprung = replace(vehicle.wheels[2], suspension=Suspension(mass=20.0, stiffness=2e4))
+    with pytest.raises(ValueError, match="suspension: got it on bogie 'l'"):
+        replace(vehicle, wheels=(*vehicle.wheels[:2], sprung, *vehicle.wheels[3:]))
+    with pytest.raises(ValueError, match="two bogies share a name"):
+        replace(vehicle, bogies=(vehicle.bogies[0], replace(vehicle.bogies[1], name="l")))
+    heavy = replace(vehicle.bogies[0].body, mass=990.0)
+    with pytest.raises(ValueError, match="sprung wheels and bogies weigh more"):
+        replace(vehicle, bogies=(replace(vehicle.bogies[0], body=heavy), vehicle.bogies[1]))

@@ -107,8 +107,8 @@ def test_both_paths_give_the_same_drop_and_the_ledger_closes(name: str) -> None:
     rel = 1e-3 if name in ("rebound", "adhesion", "two parts") else 5e-4
     expected = [pytest.approx(v, rel=rel) for v in peaks(full.recording)]
     if name == "guide":  # whose friction turns at the peak: m_b1 a leaps by 2 F_c/(1 + m_s/m_b1), wherever a row is
-        leap = 2.0 * CHANGES[name]["effects.guide-friction.force"] / 11.0
-        expected[1] = pytest.approx(peaks(full.recording)[1], abs=leap)
+        jump = 2.0 * CHANGES[name]["effects.guide-friction.force"] / 11.0
+        expected[1] = pytest.approx(peaks(full.recording)[1], abs=jump)
     assert peaks(alone) == expected
     for channel, scale in (("striker/position_z", 0.3), ("striker/velocity_z", 3.0)):
         error = np.abs(alone[channel] - full.recording[channel])

@@ -148,7 +148,7 @@ def test_a_layer_may_have_a_stiffness_of_its_own() -> None:
 
 
 @pytest.mark.parametrize("onset", [0.0, 0.4, 1.0])
-def test_layer_leaps_or_sets_in(onset: float) -> None:
+def test_layer_jumps_or_sets_in(onset: float) -> None:
     """F = K z above h, K (z + (r - 1)(z - onset h)) below: at the top it leaps by K h (r - 1)(1 - onset)."""
     K, h, r = 2e4, 0.05, 2.5
     layer = {f"effects.soil-layer.{n}": v for n, v in {"depth": h, "stiffness_ratio": r, "onset": onset}.items()}

@@ -21,7 +21,7 @@ from rollover.kernels.tables import BLOCK, Tables
 from rollover.scenario import Scenario, load
 from rollover.spec.document import content_hash, shipped_folder, to_mapping
 from rollover.studies.case_store import Row
-from rollover.studies.ensemble import extremes, neighbours, spreads
+from rollover.studies.ensemble import extremes, perturbed_starts, spreads
 from rollover.studies.runner import Way, conduct
 from rollover.system.errors import InputError
 from tests.rollover.studies import drops
@@ -120,7 +120,7 @@ def test_the_same_motion_and_the_same_loads(name: str) -> None:
     assert [(e.kind, e.subject) for e in engine.events][:1] == [(e.kind, e.subject) for e in loop.events][:1]
     assert engine.domain_flags == loop.domain_flags
     assert closure(loop).largest <= max(1.5 * closure(engine).largest, 1e-4)
-    ensemble = [extremes(simulate.run(s)) for s in neighbours(loop.scenario, STARTS)]
+    ensemble = [extremes(simulate.run(s)) for s in perturbed_starts(loop.scenario, STARTS)]
     exudyn = {e.key: e.value for e in extremes(engine)}
     for spread in spreads(ensemble):
         allowed = WITHIN * spread.scatter * abs(spread.mean) + FLOOR * abs(spread.mean)

@@ -77,12 +77,12 @@ def slope_of(t: Tables, pose: np.ndarray) -> np.ndarray:
     for i in range(pose.size):
         energy = []
         for way in (1e-6, -1e-6):
-            nudged, step = pose.copy(), np.zeros(6)
+            stepped, step = pose.copy(), np.zeros(6)
             step[i % 6] = way
             b = 6 * (i // 6)
-            nudged[b : b + 3] += step[:3]
-            turn(nudged[b + 3 : b + 6], step[3], step[4], step[5])  # about body axes, as torques are
-            energy.append(tried(t, nudged)[0])
+            stepped[b : b + 3] += step[:3]
+            turn(stepped[b + 3 : b + 6], step[3], step[4], step[5])  # about body axes, as torques are
+            energy.append(tried(t, stepped)[0])
         slope[i] = (energy[0] - energy[1]) / 2e-6
     return slope
 
@@ -153,9 +153,9 @@ def test_newtons_matrix_is_the_slope_of_the_forces() -> None:
     K, slope, chance = np.zeros((q.size, q.size)), np.zeros((q.size, q.size)), 1e-7
     k.stiffen_links(handle(t), 1.0, 0.0, K)
     for i in range(q.size):
-        nudged = q.copy()
-        nudged[i] += chance
-        slope[:, i] = -(tried(t, nudged)[1] - Q) / chance
+        stepped = q.copy()
+        stepped[i] += chance
+        slope[:, i] = -(tried(t, stepped)[1] - Q) / chance
     assert {k.JOINT, k.STRAP, k.BLOCK} == set(t.link_i[t.link_memory[:, k.HELD_NOW] > 0.0, 0].tolist())
     assert np.abs(K - slope).max() < 1e-4 * np.abs(K).max()
 

@@ -57,10 +57,10 @@ def test_starts_from_rest_are_the_slopes_above_the_limit(tmp_path: Path) -> None
     found = answers(study, conduct(study, tmp_path / "out", Way(workers=0)))
     assert found["cases"] == {"all": 120, "done": 120, "failed": 0}
     limit = math.degrees(stability_angles(study.scenario, np.array([0.5 * math.pi]))[0].balance)
-    odds = found["outputs"][0]["exceedance"]
-    assert odds["low"] < (37.0 - limit) / 5.0 < odds["high"]
-    assert odds["high"] - odds["low"] < 0.19  # 2 * 1.96 sqrt(0.4 * 0.6/120) = 0.175
-    assert found["from_rest"] == odds["hits"]
+    exceedance = found["outputs"][0]["exceedance"]
+    assert exceedance["low"] < (37.0 - limit) / 5.0 < exceedance["high"]
+    assert exceedance["high"] - exceedance["low"] < 0.19  # 2 * 1.96 sqrt(0.4 * 0.6/120) = 0.175
+    assert found["from_rest"] == exceedance["hits"]
     assert found["outputs"][0]["quantiles"] == []  # of what is 0 or 1 there are none
 
 

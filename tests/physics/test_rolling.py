@@ -164,7 +164,7 @@ def test_the_axle_swings_the_chassis_down() -> None:
 
 
 @pytest.mark.parametrize(("back", "wheel"), [(0.0, "front"), (-0.6, "rear")])
-def test_the_blow_turns_the_vehicle_about_the_new_line(back: float, wheel: str) -> None:
+def test_the_impact_turns_the_vehicle_about_the_new_line(back: float, wheel: str) -> None:
     """In the section of the centre of gravity the line from wheel to ROPS stands where the two are interpolated."""
     t = replace(NARROW, L6=back)
     found = calculate(t)
@@ -205,7 +205,7 @@ def test_where_the_rops_stands_says_about_which_line_it_goes(back: float, versio
     assert found["y6"] == pytest.approx((level - back) * math.cos(found["F2"]), abs=1e-12)
 
 
-def test_the_bonnet_lands_after_the_rops_and_takes_the_blow() -> None:
+def test_the_bonnet_lands_after_the_rops_and_takes_the_impact() -> None:
     found = calculate(replace(NARROW, H6=1.6, L6=0.0, B6=0.5))
     assert found.version == "B1"
     assert "from ROPS to bonnet" in found.sentence

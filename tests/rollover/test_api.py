@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -121,6 +123,25 @@ def test_every_function_says_what_it_takes_and_gives() -> None:
         names = function.__code__.co_varnames[: function.__code__.co_argcount + function.__code__.co_kwonlyargcount]
         told = re.split(r"[,\s]+", " ".join(re.findall(r"^    ([a-z_, ]+)$", parameters, flags=re.MULTILINE)))
         assert {*names} <= {*told}, function.__name__
+
+
+def public_methods() -> Iterator[tuple[str, Any, list[str]]]:
+    """Methods of the API's classes that take something, with what they take."""
+    for kind in (name for name in dir(ro) if name[0].isupper()):
+        for name, method in vars(getattr(ro, kind)).items():
+            taken = [*inspect.signature(method).parameters] if inspect.isfunction(method) else []
+            if taken[1:] and not name.startswith("_"):
+                yield f"{kind}.{name}", method, taken[1:]
+
+
+def test_every_method_says_what_it_takes_and_gives() -> None:
+    methods = {name: (method, taken) for name, method, taken in public_methods()}
+    assert methods.keys() >= {"Scenario.replaced", "Run.report", "ForwardModel.simulate", "Recording.samples"}
+    for name, (method, taken) in methods.items():
+        parameters, _, rest = (method.__doc__ or "").partition("Returns\n")
+        assert rest, name
+        said = re.split(r"[,\s]+", " ".join(re.findall(r"^ +([a-z_, ]+)$", parameters, flags=re.MULTILINE)))
+        assert {*taken} <= {*said}, name
 
 
 # ---------------------------------------------------------------- equal to the commands

@@ -14,7 +14,7 @@ from rollover.spec import document
 from rollover.studies import baseline as baselines
 from rollover.studies import regression
 from rollover.studies.baseline import Baseline, Load, against, allowed, baseline_from
-from rollover.studies.ensemble import Extreme, Spread, neighbours
+from rollover.studies.ensemble import Extreme, Spread, perturbed_starts
 from rollover.system.errors import InputError
 
 
@@ -175,13 +175,13 @@ def test_a_baseline_under_another_name(tmp_path: Path) -> None:
         baselines.read(tmp_path / "other.yaml")
 
 
-def test_neighbours_differ_by_nothing_that_matters() -> None:
-    group = neighbours(SCENARIO, 5)
+def test_perturbed_starts_differ_by_nothing_that_matters() -> None:
+    group = perturbed_starts(SCENARIO, 5)
     assert group[0] is SCENARIO
     assert [round((s.gravity / 9.81 - 1.0) * 1e6, 3) for s in group] == [0.0, 1.0, -1.0, 2.0, -2.0]
     assert all(s.replaced({"gravity": 9.81}) == SCENARIO for s in group)
     with pytest.raises(InputError, match="gravity: an ensemble varies gravity, got 0"):
-        neighbours(SCENARIO.replaced({"gravity": 0.0}), 2)
+        perturbed_starts(SCENARIO.replaced({"gravity": 0.0}), 2)
 
 
 def test_scatter_of_nothing_is_none() -> None:

@@ -189,7 +189,7 @@ def test_a_librarys_words_are_kept_and_a_full_disk_stays_one(tmp_path: Path) -> 
         raise OSError(28, "No space left on device")
 
 
-def test_a_fault_without_a_cure_gets_that_of_its_door() -> None:
+def test_a_fault_without_a_cure_gets_that_of_its_entry_point() -> None:
     said = r"a\.x: line 3: nothing there; another file"
     with pytest.raises(InputError, match=said), boundary.reading("a.x", "X file", cure="another file"):
         raise InputError(Fault(file="a.x", message="line 3: nothing there"))

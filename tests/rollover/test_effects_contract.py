@@ -151,7 +151,7 @@ def test_an_effect_tells_what_it_is(effect: type[Effect]) -> None:
     assert effect.channels or effect.kind == "sensor"
     names = {f.name for f in fields(effect)}
     assert {name for _, name, _, _ in string.Formatter().parse(effect.sentence) if name} <= names
-    assert effect().says().endswith(".")
+    assert effect().statement().endswith(".")
     assert effect.rivals, "no look-alike with a test that tells them apart"
     for rival, test in effect.rivals.items():
         assert rival in TABLE, rival
@@ -185,9 +185,9 @@ def test_effect_numbers_have_units_bounds_and_search_ranges(effect: type[Effect]
 
 @each
 def test_fit_traits_are_of_fitted_parameters(effect: type[Effect]) -> None:
-    assert set(effect.shapes) < set(effect.search), "a strength is left to fit"
-    assert set(effect.narrow) <= set(effect.search)
-    assert all(0.0 <= place <= 1.0 for places in effect.narrow.values() for place in places)
+    assert set(effect.secondary) < set(effect.search), "a strength is left to fit"
+    assert set(effect.local_starts) <= set(effect.search)
+    assert all(0.0 <= place <= 1.0 for places in effect.local_starts.values() for place in places)
     assert set(effect.grows) <= set(effect.search)
     if effect.kind == "sensor":
         spans = {"ground/force_normal": 4e3, "ground/force_tangential": 1e3, "ground/sinkage": 0.1}
@@ -290,10 +290,14 @@ def test_an_id_given_twice_is_an_error() -> None:
         "try:\n"
         "    type('Nameless', (Effect,), {'id': ''})\n"
         "except TypeError as error: print(error)\n"
+        "try:\n"
+        "    type('Old', (Effect,), {'id': 'old', 'shapes': ('a',)})\n"
+        "except TypeError as error: print(error)\n"
     )
-    twice, nameless = outside("-c", program).stdout.splitlines()
+    twice, nameless, old = outside("-c", program).stdout.splitlines()
     assert "'soil-layer' is taken by rollover.effects.ground" in twice
     assert "needs an `id`" in nameless
+    assert "`shapes` is named `secondary`" in old
 
 
 def test_the_listing_shows_what_each_effect_is() -> None:
@@ -320,7 +324,7 @@ def test_the_listing_shows_what_each_effect_is() -> None:
     ],
 )
 def test_a_sentence_says_which_way_and_by_how_much(id: str, values: dict[str, Any], said: str) -> None:
-    assert TABLE[id](**values).says().endswith(said)
+    assert TABLE[id](**values).statement().endswith(said)
 
 
 @pytest.mark.parametrize("effect", [e for e in TABLE.values() if "rollover" not in e.acts], ids=lambda e: e.id)

@@ -123,7 +123,7 @@ def update(folder: Path, out: Path, texts: dict[str, str], report: str) -> None:
 
 @pytest.mark.parametrize("name", ["replace", "rename"])
 @pytest.mark.parametrize("killed_at", [1, 2, 3, 4])
-def test_baselines_and_their_account_change_in_one_stroke(
+def test_baselines_and_their_report_change_in_one_stroke(
     name: str, killed_at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rollover.system.transaction import JOURNAL, finish

@@ -15,7 +15,7 @@ import pytest
 
 from rollover.assessment import results
 from rollover.system import writing
-from rollover.system.refusals import told
+from rollover.system.refusals import message_of
 from tests.rollover.disks import Disk
 from tests.rollover.machines import (
     MACHINE,
@@ -239,13 +239,13 @@ def test_a_link_inside_out_leads_nobody_out(tmp_path: Path) -> None:
     ],
 )
 def test_a_fault_of_the_machine_in_words(fault: Any, line: str) -> None:
-    said = told(fault, Path("out/a"))
+    said = message_of(fault, Path("out/a"))
     assert said.startswith(line), said
     assert "\n" not in said
 
 
 @pytest.mark.parametrize("fault", [MemoryError(), BrokenExecutor(), OSError(errno.EIO, "x")])
-def test_the_door_turns_it_into_a_status_and_not_a_bug(fault: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_turns_it_into_a_status_and_not_a_bug(fault: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def breaks(*_: Any, **__: Any) -> None:
         raise fault
 

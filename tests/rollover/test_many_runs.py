@@ -27,7 +27,7 @@ from rollover.studies.carry_out import prepared
 from rollover.studies.case import _simulated
 from rollover.studies.case_store import Row
 from rollover.studies.design import Points, points
-from rollover.studies.ensemble import neighbours, with_scatter
+from rollover.studies.ensemble import perturbed_starts, with_scatter
 from rollover.studies.plan import Random
 from rollover.studies.runner import START, Builder, Conducted, Way, conduct, evaluate
 from rollover.system.errors import InputError
@@ -43,7 +43,7 @@ def carried_out(folder: Path, *changes: tuple[str, str], **values: Any) -> dict[
     """What study.json of a study of drops says."""
     ready = prepared(drops(folder, *changes), folder / "out", **values)
     ready.carried_out(Way(workers=0), page=lambda *_: "")
-    found: dict[str, Any] = json.loads((folder / "out" / case_store.ACCOUNT).read_text(encoding="utf-8"))
+    found: dict[str, Any] = json.loads((folder / "out" / case_store.REPORT).read_text(encoding="utf-8"))
     return found
 
 
@@ -68,7 +68,7 @@ def test_one_of_many_runs_is_compiled_where_it_can_be(name: str) -> None:
     assert stated.of_many() is stated
 
 
-def test_a_study_is_compiled_and_exudyn_looks_at_a_hundredth(tmp_path: Path) -> None:
+def test_a_study_is_compiled_and_exudyn_checks_a_hundredth(tmp_path: Path) -> None:
     told = carried_out(tmp_path, FULL, FEW)
     assert told["integrator"] == "compiled"
     check = told["reference_check"]
@@ -133,7 +133,7 @@ def test_overturns_of_a_study_are_exudyn_s_within_their_scatter(tmp_path: Path) 
     loop, engine = (conduct(s, tmp_path / name, Way(workers=0)) for s, name in ((study, "loop"), (stated, "engine")))
     builder = Builder(study)
     for k, exudyn in enumerate(engine.rows):
-        starts = neighbours(builder.scenario(loop.points.row(k)), STARTS)
+        starts = perturbed_starts(builder.scenario(loop.points.row(k)), STARTS)
         runs = [_simulated(start, clearance=False)[0] for start in starts]
         assert runs[0] == loop.rows[k].measures
         for output in study.outputs:
@@ -236,11 +236,11 @@ def test_the_check_counts_what_ended_otherwise(tmp_path: Path, monkeypatch: pyte
         (0.98, [0.0] * 5, False, "is 0 in all neighbouring starts; beyond what these scatter by: ground/force_normal"),
     ],
 )
-def test_a_large_difference_stands_beside_scatter_of_neighbours(
+def test_a_large_difference_stands_beside_the_runs_scatter(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, factor: float, spread: list[float], within: bool | None, said: str
 ) -> None:
     check, _ = checked_with([{}, {FORCE: factor}, {}], [spread], tmp_path, monkeypatch)
-    beside = check["neighbours"]
+    beside = check["perturbed"]
     assert (beside["starts"], beside["cases"]) == (5, 1)
     (response,) = beside["responses"]
     assert (response["name"], response["point"], response["within"]) == (FORCE, check["points"][1], within)
@@ -249,16 +249,16 @@ def test_a_large_difference_stands_beside_scatter_of_neighbours(
     json.dumps(plain(check), allow_nan=False)
 
 
-def test_small_differences_ask_for_no_neighbours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_small_differences_ask_for_no_perturbed_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     check, asked = checked_with([{FORCE: 1.009}, {}, {}], [], tmp_path, monkeypatch)
-    assert check["neighbours"] is None
+    assert check["perturbed"] is None
     assert len(asked) == 1
 
 
 def test_a_response_that_is_0_by_exudyn_differs_by_all_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     check, _ = checked_with([{}, {}, {FORCE: 0.0}], [SPREAD], tmp_path, monkeypatch)
     assert (check["outputs"][0]["cases"], check["largest"]) == (3, 1.0)
-    assert check["neighbours"]["responses"][0]["within"] is False
+    assert check["perturbed"]["responses"][0]["within"] is False
 
 
 def test_neighbouring_starts_of_a_point_are_cases_like_others(tmp_path: Path) -> None:
@@ -268,7 +268,7 @@ def test_neighbouring_starts_of_a_point_are_cases_like_others(tmp_path: Path) ->
     builder = Builder(study)
     own = builder.scenario(at)
     starts = [builder.scenario({**at, START: float(k)}) for k in range(4)]
-    assert starts == neighbours(own, 4)
+    assert starts == perturbed_starts(own, 4)
     assert [round(1e6 * (s.gravity / own.gravity - 1.0), 3) for s in starts] == [0.0, 1.0, -1.0, 2.0]
     keys = [builder.key({**at, START: float(k)}) for k in range(4)]
     assert keys[0] == builder.key(at)
@@ -287,7 +287,7 @@ def test_the_slope_study_s_largest_difference_is_within_scatter(tmp_path: Path) 
     by_name = {output["name"]: output["largest"] for output in check["outputs"]}
     # a residual is what two sums of 1e4 J leave of each other: a tenth of it is nothing that a load would show
     assert max(value for name, value in by_name.items() if name != "ledger/residual") < 0.1
-    beside = check["neighbours"]
+    beside = check["perturbed"]
     assert {one["name"] for one in beside["responses"]} == {n for n, v in by_name.items() if v > reference.LARGE}
     assert all(one["within"] for one in beside["responses"]), beside
     assert len(case_store.stored_keys(tmp_path)) == 2 + 4  # the case, Exudyn's, and four neighbours
@@ -298,7 +298,7 @@ def test_the_check_s_limit_is_student_s() -> None:
     assert reference.STARTS == STARTS
 
 
-def test_neighbours_of_a_run_are_many_and_the_run_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_perturbed_starts_of_a_run_are_many_and_the_run_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
     made = []
 
     def seen(scenario: Any, **more: Any) -> Any:
@@ -344,7 +344,7 @@ def test_set_gives_the_study_s_scenario_another_value_and_tells(tmp_path: Path) 
     assert (plain.exit_code, stiff.exit_code) == (0, 0), stiff.output
     assert "Set: ground.law.stiffness_scale=4" in stiff.stdout
     accounts: list[Mapping[str, Any]] = [
-        json.loads((tmp_path / name / case_store.ACCOUNT).read_text(encoding="utf-8")) for name in ("plain", "out")
+        json.loads((tmp_path / name / case_store.REPORT).read_text(encoding="utf-8")) for name in ("plain", "out")
     ]
     assert [a["set"] for a in accounts] == [[], ["ground.law.stiffness_scale=4"]]
     assert "ground.law.stiffness_scale" in accounts[1]["differs"]

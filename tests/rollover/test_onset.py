@@ -205,7 +205,7 @@ def test_a_vehicle_that_is_like_nothing_simulated_is_refused(overturn: tuple[Sce
 
 def identified(recordings: Mapping[str, Recording]) -> dict[str, tuple[float, float | None, float | None]]:
     scenario = load("drop_test")
-    drops, refused = ground_law.drops_of(ground_law.settled(recordings, scenario).recordings, scenario)
+    drops, refused = ground_law.drops_of(ground_law.usable(recordings, scenario).recordings, scenario)
     assert not refused
     return {c.name: (c.value, c.low, c.high) for c in identify(drops).coefficients}
 

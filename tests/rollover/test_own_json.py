@@ -63,13 +63,13 @@ def test_a_comparison_of_another_kind_is_refused(value: object, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("text", ODD.values(), ids=ODD)
-def test_an_account_that_is_none_leaves_a_study_alone(text: str, tmp_path: Path) -> None:
-    (tmp_path / case_store.ACCOUNT).write_text(text)
+def test_a_report_that_is_none_leaves_a_study_alone(text: str, tmp_path: Path) -> None:
+    (tmp_path / case_store.REPORT).write_text(text)
     (tmp_path / case_store.CASES).mkdir()
     done = CliRunner().invoke(app, ["study", "rops_stiffness", "--out", str(tmp_path)])
     assert done.exit_code == 2
     assert "another --out, or --force" in done.stderr
-    assert (tmp_path / case_store.ACCOUNT).read_text() == text
+    assert (tmp_path / case_store.REPORT).read_text() == text
 
 
 @pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)

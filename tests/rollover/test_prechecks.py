@@ -157,11 +157,11 @@ def test_a_planted_fault_is_found(fault: Fault, check: str, channel: str) -> Non
     assert seen >= 4
 
 
-@pytest.mark.parametrize(("corner", "leap"), [(6.0, 0.0), (10.0, 0.0), (0.0, 8.0), (0.0, 12.0)])
-def test_a_corner_and_a_leap_are_no_spikes(corner: float, leap: float) -> None:
+@pytest.mark.parametrize(("corner", "jump"), [(6.0, 0.0), (10.0, 0.0), (0.0, 8.0), (0.0, 12.0)])
+def test_a_corner_and_a_jump_are_no_spikes(corner: float, jump: float) -> None:
     """A force that turns from one sample to the next, or jumps: what comes before says the sample beside it."""
     k = np.arange(N) - 0.4 * N
-    shape = corner * np.minimum(k, 0.0) + leap * (k > 0.0)
+    shape = corner * np.minimum(k, 0.0) + jump * (k > 0.0)
     for seed in range(12):
         values = SIGMA[A] * (shape + np.random.default_rng(seed).standard_normal(N))
         assert not [f for f in prechecks(replace(drop(0), channels={A: values})) if f.check == "spike"], seed

@@ -60,6 +60,7 @@ RUN = [
     "docs/inputs.md",
     "docs/occupant.md",
     "docs/articulated.md",
+    "docs/machines.md",
     "docs/own_law.md",
     "docs/viewing.md",
     "docs/python.md",

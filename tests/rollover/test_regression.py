@@ -19,7 +19,7 @@ from rollover.scenario import load
 from rollover.studies import baseline as baselines
 from rollover.studies import regression
 from rollover.studies.baseline import against
-from rollover.studies.ensemble import measured, neighbours
+from rollover.studies.ensemble import measured, perturbed_starts
 
 runner = CliRunner()
 DROP = """\
@@ -132,7 +132,7 @@ def test_the_shipped_overturn_passes_under_other_rounding() -> None:
     scenario = load("side_overturn")
     known = baselines.read(baselines.path_of(regression.chosen(["side_overturn"]).files[0]))
     assert known.starts > 1
-    starts = [s.replaced({"gravity": s.gravity * (1.0 + 1e-12)}) for s in neighbours(scenario, known.starts)]
+    starts = [s.replaced({"gravity": s.gravity * (1.0 + 1e-12)}) for s in perturbed_starts(scenario, known.starts)]
     answer = against(known, scenario, [measured(s) for s in starts])
     assert answer.ok, answer.sentence
     moved = max(abs(d.change) for d in answer.differences if d.change is not None)

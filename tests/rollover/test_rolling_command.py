@@ -16,7 +16,7 @@ def rollover(*words: object) -> Result:
     return CliRunner().invoke(app, ["rolling", *(str(w) for w in words)])
 
 
-def test_account_and_page_of_a_vehicle(tmp_path: Path) -> None:
+def test_report_and_page_of_a_vehicle(tmp_path: Path) -> None:
     done = rollover("vineyard_tractor", "--set", "vehicle.whole.mass=1600", "--out", tmp_path, "--json")
     assert done.exit_code == 0, done.output
     answer = json.loads((tmp_path / "rolling.json").read_text())

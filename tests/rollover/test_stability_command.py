@@ -24,7 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_account_of_a_vehicle(folder: Path) -> None:
+def test_report_of_a_vehicle(folder: Path) -> None:
     answer = json.loads((folder / "stability.json").read_text())
     assert answer["format"] == "rollover-stability/1"
     rows = answer["headings"]

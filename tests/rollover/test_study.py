@@ -257,15 +257,6 @@ def test_a_changed_study_runs_only_what_is_new(tmp_path: Path) -> None:
     assert all("exudyn" in v for v in told["versions"])
 
 
-def test_a_damaged_file_is_run_again(tmp_path: Path) -> None:
-    _, done = conducted(tmp_path)
-    path = case_store.path_of(tmp_path / "out", done.keys[4])
-    path.write_bytes(path.read_bytes()[:100])
-    before = (tmp_path / "out" / case_store.TABLE).read_bytes()
-    assert conducted(tmp_path)[1].ran == 1
-    assert (tmp_path / "out" / case_store.TABLE).read_bytes() == before
-
-
 def test_an_invalid_point_is_a_row_and_failures_are_retried(tmp_path: Path) -> None:
     (tmp_path / "points.csv").write_text("speed\n2.0\n-1.0\n3.0\n")
     path = tmp_path / "rows.yaml"

@@ -51,7 +51,7 @@ def _plan(text: str) -> str:
     advice = Advice(
         effects=(names[0], names[1]), probability=0.6, best=tried, is_enough=False, tried=(tried,), known=text
     )
-    shares = {"tolerance": 0.0, "gain": 0.01, "power": 0.8, "false_alarm": 0.05, "size": 0.01, "told_apart": 0.9}
+    shares = {"tolerance": 0.0, "gain": 0.01, "power": 0.8, "false_alarm": 0.05, "size": 0.01, "distinguishable": 0.9}
     found = Plan(
         conditions=({text: text},),
         noise={"ground/force_normal": 1.0},
@@ -73,7 +73,9 @@ def _rolling(text: str) -> str:
 
 @functools.cache
 def _pushed() -> dict[str, Any]:
-    return frame_json.json_of(frame_test(frame_json.scenario_of("two_post_rear_tubes_3t", 3000.0), segments=4))
+    weld = {"name": "foot", "member": "post_left", "end": "start", "weld": {"throat": 5.0}}  # which gives way
+    frame = frame_json.scenario_of("two_post_rear_tubes_3t", 3000.0).replaced({"vehicle.rops.connections": [weld]})
+    return frame_json.json_of(frame_test(frame, segments=4))
 
 
 def _rops(text: str) -> str:

@@ -118,11 +118,11 @@ def test_gaps_stay_gaps(drop: Run, tmp_path: Path) -> None:
     np.testing.assert_array_equal(plotted, force * 1e-3)
 
 
-def test_a_band_of_neighbours_joins_the_plot_of_its_load(overturn: Run, tmp_path: Path) -> None:
+def test_a_band_of_scatter_joins_the_plot_of_its_load(overturn: Run, tmp_path: Path) -> None:
     time, force = overturn.recording.time, overturn.recording["rops/force"]
     band = Band(channel="rops/force", cfc=60, starts=3, time=time, mean=force, deviation=0.1 * force)
     log.write_rrd(overturn, tmp_path / "band.rrd", bands=[band])
-    entity = "/" + series("rops/force").neighbours
+    entity = "/" + series("rops/force").scatter
     assert entity.startswith("/" + series("rops/force").path + "/"), "the plot shows what lies below its path"
     (at, mean), (_, variance) = (
         flat(tmp_path / "band.rrd", entity, f"Measurements:{c}") for c in ("values", "variances")

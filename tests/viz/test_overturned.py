@@ -28,7 +28,7 @@ def test_a_misfit_is_held_against_noise_and_scatter() -> None:
     assert replace(track, scatter=None).rms_before == pytest.approx(np.sqrt(0.5 * 1.0 + 0.5 * 25.0))
 
 
-def test_scatter_is_what_neighbours_differ_by() -> None:
+def test_scatter_is_what_perturbed_runs_differ_by() -> None:
     time = np.linspace(0.0, 1.0, 400)
     perturbed = [np.full(400, 0.3), np.full(400, -0.5), np.full(400, np.nan)]
     found = _scatter(perturbed, time)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -118,6 +119,17 @@ def test_the_residual_is_measured_less_simulated() -> None:
     peak = points_of(plots.overlay(measured, simulated, label="kN"), "muted")
     assert peak[1, 1] < peak[0, 1]  # upwards is less in a figure: +2 at the middle stamp
     assert peak[0, 1] == peak[2, 1]
+
+
+@pytest.mark.parametrize("empty", [0, 1])
+def test_a_curve_without_a_number_leaves_its_half_empty(empty: int) -> None:
+    """One of two runs may hold a channel without any value: the other is drawn all the same."""
+    t = np.linspace(0.0, 1.0, 50)
+    curves = [Curve(name="was", x=t, y=1.0 + t), Curve(name="now", x=t[::2], y=2.0 + t[::2])]
+    curves[empty] = replace(curves[empty], y=np.full(curves[empty].x.shape, np.nan))
+    svg = plots.overlay(curves[0], curves[1], label="force, kN")
+    assert "<svg" in svg
+    assert "NaN" not in svg
 
 
 def test_a_tornado_shows_the_widest_first() -> None:

@@ -1,7 +1,7 @@
 """Where each channel stands in a recording for the viewer, and how it looks: path, name, unit, colour. Data only.
 
 Paths are ``<group>/<channel with _ for />_<unit>/<source>``, source being ``simulated``, ``measured``, ``limit``,
-``neighbours`` or ``peak``, so that a measured recording or a limit joins the same plot. People read kN, deg, mm and kJ.
+``scatter`` or ``peak``, so that a measured recording or a limit joins the same plot. People read kN, deg, mm and kJ.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ PHASE = {
     "driven": 0x9A6A2FFF,
     "failed": 0xF0434EFF,
 }
-FILTERED, NEIGHBOURS = 0xFFFFFFFF, 0x8FCB6BFF
+FILTERED, SCATTER = 0xFFFFFFFF, 0x8FCB6BFF
 CYCLE = (0x66D9C2FF, 0xF4D35EFF, 0xE78AC3FF, 0x8FCB6BFF, 0xB79CF5FF, 0xFF7043FF, 0x9FB4CCFF)
 
 # SI unit -> (unit for people, factor); what is not here is shown in SI
@@ -102,7 +102,7 @@ class Series:
         return f"{self.path}/measured"
 
     @property
-    def neighbours(self) -> str:
+    def scatter(self) -> str:
         """Path of the mean over neighbouring starts."""
         return f"{self.path}/neighbours"
 
@@ -187,7 +187,7 @@ def _describe(channel: str) -> tuple[str, str, int]:
         case ["sensor", name, what]:
             group, quantity, shade = "motion", *_motion("sensor", what)
             return group, f"{name.replace('_', ' ')}: {quantity}", shade
-        case ["occupant" | "hitch" | "trailer" | "suspension" as of, *rest]:
+        case ["occupant" | "hitch" | "trailer" | "suspension" | "bogie" as of, *rest]:
             return _describe_linked(of, rest)
         case ["energy", name]:
             return "energy", name, LEDGER.get(name, _any(name))
@@ -225,9 +225,11 @@ def _describe_rops(channel: str, rest: list[str]) -> tuple[str, str, int]:
 
 
 def _describe_linked(of: str, rest: list[str]) -> tuple[str, str, int]:
-    """What links hold: a trailer, a sprung wheel, an occupant."""
+    """What links hold: a trailer, a bogie, a sprung wheel, an occupant."""
     if of in ("hitch", "trailer"):
         return "hitch", f"{of} {rest[0].replace('_', ' ')}", _any(f"{of} {rest[0]}")
+    if of == "bogie":
+        return "suspension", *_describe_occupant([of, *rest])
     return of, *_describe_occupant(rest)
 
 

@@ -137,8 +137,7 @@ def overlay(
         _draw(above, [_roled(measured, "second"), _roled(simulated, "first")])
         finish(above, "", label, margins=(0.0, 0.08))
         _shade(above, phases)
-        good = np.isfinite(simulated.x) & np.isfinite(simulated.y)
-        model = np.interp(measured.x, simulated.x[good], simulated.y[good], left=np.nan, right=np.nan)
+        model = _at(simulated, measured.x)
         rest = model - measured.y if turned else measured.y - model
         what, (_, comma, unit) = "difference" if turned else "residual", label.rpartition(", ")
         _draw(below, [Curve(name=what, x=measured.x, y=rest, role="muted")])
@@ -146,6 +145,14 @@ def overlay(
         finish(below, "time, s", f"{what}{comma}{unit if comma else ''}", margins=(0.0, 0.1))
         _shade(below, [(start, "") for start, _ in phases])
     return svg.text
+
+
+def _at(curve: Curve, x: Array) -> Array:
+    """A curve at other places, straight between those where it has a value; NaN outside of them."""
+    good = np.isfinite(curve.x) & np.isfinite(curve.y)
+    if not good.any():
+        return np.full(x.shape, np.nan)
+    return np.asarray(np.interp(x, curve.x[good], curve.y[good], left=np.nan, right=np.nan))
 
 
 def before_after(

@@ -77,7 +77,9 @@ def headline(found: Plan) -> Headline:
     pairs = {frozenset((p.effect, p.rival)) for p in found.pairs}
     apart = len(pairs) - len(confused)
     plural = "" if len(pairs) == 1 else "s"
-    told = f", {apart} of {len(pairs)} pair{plural} told apart with {found.told_apart:.0%} or more" if pairs else ""
+    told = (
+        f", {apart} of {len(pairs)} pair{plural} told apart with {found.distinguishable:.0%} or more" if pairs else ""
+    )
     best = [a.best.message() for a in found.next_tests if a.best is not None]
     return Headline(
         sentence=f"{len(seen)} of {len(found.effects)} effects would show in these drops{told}.",

@@ -29,6 +29,18 @@ MEMBERS = (
 )
 
 
+CONNECTIONS = (
+    "connection",
+    "what",
+    "holds",
+    "N, kN",
+    "M depth, kN m",
+    "M width, kN m",
+    "of the tube, %",
+    "use by load",
+)
+
+
 def page(answer: Mapping[str, Any], *, command: str) -> str:
     """HTML of the report that `rollover rops` writes."""
     done = [e for e in answer["tests"] if "curve" in e]
@@ -52,6 +64,8 @@ def page(answer: Mapping[str, Any], *, command: str) -> str:
             Section(title="Where it yields, in order", blocks=[Table(columns=HINGES, rows=rows, numeric=(1, 2, 4, 5))])
         )
     blocks.append(Section(title="Members", blocks=[_members(answer)]))
+    if "connections" in answer:
+        blocks.append(Section(title="Connections", blocks=[_connections(answer)]))
     notes: list[Block] = [Note(text=said, warning=True) for said in answer["warnings"]]
     blocks.append(Section(title="In words", blocks=[*notes, Note(text=answer["method"])]))
     return render(
@@ -119,6 +133,26 @@ def _hinge(load: str, h: Mapping[str, Any]) -> list[str | Cell]:
         f"{h['place']:.2f} of {h['of']:.2f}",
         f"{1e-3 * h['moment']:.2f}",
     ]
+
+
+def _connections(answer: Mapping[str, Any]) -> Table:
+    rows: list[list[str | Cell]] = []
+    for k, c in enumerate(answer["connections"]):
+        uses = [(e["name"], e["connections"][k]["use"]) for e in answer["tests"] if "connections" in e]
+        worst = max((use for _, use in uses), default=0.0)
+        rows.append(
+            [
+                c["name"],
+                c["kind"],
+                f"{c['end']} of {c['member']}",
+                f"{1e-3 * c['force']:.0f}",
+                f"{1e-3 * c['moment_depth']:.2f}",
+                f"{1e-3 * c['moment_width']:.2f}",
+                Cell(text=f"{100.0 * c['of_member']:.0f}", state="" if c["of_member"] >= 1.0 else "warn"),
+                Cell(text=", ".join(f"{n} {use:.2f}" for n, use in uses), state="fail" if worst > 1.0 else "pass"),
+            ]
+        )
+    return Table(columns=CONNECTIONS, rows=rows, numeric=range(3, 7))
 
 
 def _members(answer: Mapping[str, Any]) -> Table:

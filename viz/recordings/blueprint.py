@@ -41,7 +41,7 @@ LOADS: _Plots = (
     ("Contact area, cm\N{SUPERSCRIPT TWO}", ("ground/contact_area",)),
     ("Hitch, kN", ("hitch/force",)),
     ("Hitch, kN m", ("hitch/moment",)),
-    ("Suspension, kN", ("suspension/*/force",)),
+    ("Suspension, kN", ("suspension/*/force", "bogie/*/force")),
     ("Suspension, m", ("suspension/*/travel",)),
     ("Occupant, kN", ("occupant/*/contact_force", "occupant/*/ground_force", "occupant/*/force")),
 )
@@ -60,6 +60,7 @@ MOTION: _Plots = (
     ("Acceleration, m/s\N{SUPERSCRIPT TWO}", ("chassis/acceleration_?",)),
     ("Attitude, deg", ("chassis/pitch", "chassis/yaw", "axle/*/angle")),
     ("Trailer, deg", ("trailer/*", "hitch/angle_?")),
+    ("Bogies, deg", ("bogie/*/angle",)),
     ("Position, m", ("chassis/position_?",)),
     ("Velocity, m/s", ("chassis/velocity_?",)),
     ("Head and torso, m/s\N{SUPERSCRIPT TWO}", ("occupant/head/acceleration_?", "occupant/torso/acceleration_?")),

@@ -15,7 +15,7 @@ from rollover.assessment.bands import Band
 from rollover.assessment.ledger import closure
 from rollover.dynamics.result import Run
 from rollover.spec.document import content_hash, dump
-from viz.content.entities import FILTERED, LIMIT, NEIGHBOURS, PHASE, series
+from viz.content.entities import FILTERED, LIMIT, PHASE, SCATTER, series
 from viz.content.verdict import Peak, filtered, known, ranked, raw, title_of, verdict
 from viz.recordings import band
 from viz.recordings.blueprint import Beside, blueprint
@@ -62,7 +62,7 @@ def write_rrd(
         _looks(out, run, found)
         for one in bands:
             s, name = series(one.channel), f"mean of {one.starts} starts, CFC {one.cfc}"
-            band.look(out, s.neighbours, name=name, width=1.5, unit=s.unit, is_band=True, shade=NEIGHBOURS)
+            band.look(out, s.scatter, name=name, width=1.5, unit=s.unit, is_band=True, shade=SCATTER)
         _documents(out, run, verdict(run, found, with_.scales))
         out.settle()
         moving(out, run, with_)
@@ -71,7 +71,7 @@ def write_rrd(
             out.columns(s.simulated, run.recording.time, rr.Scalars.columns(scalars=values * s.factor))
         for one in bands:
             s = series(one.channel)
-            band.rows(out, s.neighbours, one.time, one.mean * s.factor, one.deviation * s.factor)
+            band.rows(out, s.scatter, one.time, one.mean * s.factor, one.deviation * s.factor)
         _peaks(out, run, found)
         if found and found[0] in _marked(run, found):
             peak_place(out, run, found[0], with_.size)

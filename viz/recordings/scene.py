@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.dynamics.result import Run
+from rollover.spec.bogie import Bogie
 from rollover.spec.inertia import MassProperties
 from rollover.spec.rops import ClearanceZone, Rops
 from rollover.spec.shapes import Box, Disc, Point, Points, Shape, Tube, axes_along
@@ -51,7 +52,7 @@ def _vehicle(vehicle: Vehicle | RigidBody) -> tuple[Part, ...]:
         found.append(_equivalent(vehicle.whole, f"{chassis}/equivalent_cuboid"))
     for wheel in vehicle.wheels:
         found += _wheel(wheel, f"{body_path(wheel.hub)}/{escaped(wheel.name)}")
-    rear = [w for w in vehicle.wheels if w.carrier == "chassis"]
+    rear = [w for w in vehicle.wheels if w.carrier == "chassis" and w.bogie is None]
     for i, (a, b) in enumerate(_opposite(rear)):
         # not part of the model: without it the wheels would hang in the air
         found.append(_beam(a.centre, b.centre, f"{chassis}/axle_{i}"))
@@ -61,7 +62,9 @@ def _vehicle(vehicle: Vehicle | RigidBody) -> tuple[Part, ...]:
         x, y, z = vehicle.front_axle.pivot
         found.append(Rod(path=f"{axle}/pivot", start=(x - 0.15, y, z), end=(x + 0.15, y, z), radius=0.05, colour=STEEL))
     if vehicle.trailer is not None:
-        found += _trailer(vehicle.trailer, [w for w in vehicle.wheels if w.carrier == "trailer"])
+        found += _trailer(vehicle.trailer, [w for w in vehicle.wheels if w.carrier == "trailer" and w.bogie is None])
+    for bogie in vehicle.bogies:
+        found += _bogie(bogie, [w for w in vehicle.wheels if w.bogie == bogie.name])
     if vehicle.rops is not None:
         found += _rops(vehicle.rops)
     for mass in vehicle.attached:
@@ -86,6 +89,15 @@ def _trailer(trailer: Trailer, wheels: list[Wheel]) -> list[Part]:
     found += [_beam(a.centre, b.centre, f"{root}/axle_{i}") for i, (a, b) in enumerate(_opposite(wheels))]
     hitch = np.array([trailer.hitch.position])
     return [*found, Balls(path=f"{root}/hitch", centres=hitch, radii=np.array([0.08]), colour=DARK_STEEL)]
+
+
+def _bogie(bogie: Bogie, wheels: list[Wheel]) -> list[Part]:
+    """A beam along its wheels, and its pin."""
+    root, (x, y, z) = body_path(bogie.part), bogie.pivot
+    on = (x, wheels[0].centre[1], z)
+    found: list[Part] = [_beam(on, w.centre, f"{root}/beam_{escaped(w.name)}") for w in wheels]
+    out = math.copysign(0.15, wheels[0].centre[1])
+    return [*found, Rod(path=f"{root}/pin", start=(x, y - out, z), end=on, radius=0.09, colour=STEEL)]
 
 
 def _stand(run: Run) -> tuple[Part, ...]:

@@ -154,7 +154,7 @@ def terrain(
     x0, x1, y0, y1 = _bounds(elements)
     a, b, c, d = outer or (x0, x1, y0, y1)
     outer = (min(a, x0), max(b, x1), min(c, y0), max(d, y1))
-    moving = _with_neighbours(touched, nx, ny)
+    moving = _with_adjacent(touched, nx, ny)
     block = 1
     while (math.ceil(nx / block) + 1) * (math.ceil(ny / block) + 1) > _MOST_VERTICES:
         block += 1
@@ -310,7 +310,7 @@ def _columns(touched: NDArray[np.int64], moving: NDArray[np.int64]) -> NDArray[n
     return np.where(touched[at] == moving, at, -1)
 
 
-def _with_neighbours(touched: NDArray[np.int64], nx: int, ny: int) -> NDArray[np.int64]:
+def _with_adjacent(touched: NDArray[np.int64], nx: int, ny: int) -> NDArray[np.int64]:
     ix, iy = touched // ny, touched % ny
     around = [(ix + i, iy + j) for i, j in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))]
     x, y = (np.concatenate(parts) for parts in zip(*around, strict=True))

@@ -22,7 +22,7 @@ from typer.models import CommandFunctionType
 
 # what takes long to import is imported by the command that needs it: `rollover --help` answers at once
 from rollover.system.errors import Fault, InputError
-from rollover.system.refusals import refused, told
+from rollover.system.refusals import message_of, refused
 from rollover.system.writing import working
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ def answering(command: C) -> C:
                     if (wrong := refused(e, work.targets)) is not None:
                         raise InputError(wrong) from None
                     target = next(reversed(work.targets), None)
-                    said, status = told(e, target), MACHINE
+                    said, status = message_of(e, target), MACHINE
         except InputError as e:
             said, status = str(e), WRONG_INPUT
         except KeyboardInterrupt:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rollover.proof.commitment import Seal
 
 JSON, SEAL, TRUTH, DIAGNOSES, PAGE = "prove.json", "seal.json", "truth.json", "diagnoses.jsonl", "report.html"
-ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES, PAGE)
+REPORT_FILES = (JSON, SEAL, TRUTH, DIAGNOSES, PAGE)
 
 
 @app.command(
@@ -113,7 +113,7 @@ def prove(
     about = {"cases": cases, "seed": seed, "kinds": kinds or [], "effects": effects or []}
     about |= {"rig": rig} if rig != "drop" else {}
     about |= {"background": _share_of(background)} if background is not None else {}
-    results.claim_report(out, runner.FORMAT, about, ACCOUNT, force=force)
+    results.claim_report(out, runner.FORMAT, about, REPORT_FILES, force=force)
 
     def tell(seal: Seal) -> None:
         console.say(f"Sealed: the truth of {seal.cases} cases has the hash {seal.digest}; the diagnosis starts now.")

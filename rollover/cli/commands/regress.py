@@ -79,7 +79,7 @@ def regress(
         return f"replaces the report of {', '.join(sorted(before))}" if shared else ""
 
     results.claim_report(
-        out, FORMAT, {"scenarios": selection}, ACCOUNT, force=force, own_report=overlaps, say=console.say
+        out, FORMAT, {"scenarios": selection}, REPORT_FILES, force=force, own_report=overlaps, say=console.say
     )
     failed: list[Answer] = []
     new: dict[Path, Baseline] = {}
@@ -93,7 +93,7 @@ def regress(
                 answers = failed = e.answers
         else:
             answers = regression.compared(choice, workers=workers, time_limit=time_limit, show=show)
-    report = _account(selection, answers, _hash(choice.files))
+    report = _report(selection, answers, _hash(choice.files))
     with updating(out, baselines.texts(new)) as part:
         results.write_json(part / JSON, report)
         results.write_csv(part / CSV, _rows(answers))
@@ -111,7 +111,7 @@ def regress(
 
 FORMAT = "rollover-regress/1"
 JSON, CSV, PAGE = "regress.json", "regress.csv", "report.html"
-ACCOUNT = (JSON, CSV, PAGE)
+REPORT_FILES = (JSON, CSV, PAGE)
 
 
 def _settled(files: Sequence[Path], update: bool) -> None:
@@ -142,7 +142,7 @@ def _hash(files: Sequence[Path]) -> str:
     return digest.hexdigest()
 
 
-def _account(selection: list[str], answers: list[Answer], scenario_hash: str) -> dict[str, Any]:
+def _report(selection: list[str], answers: list[Answer], scenario_hash: str) -> dict[str, Any]:
     from rollover.assessment import results
 
     found: dict[str, Any] = results.plain(

@@ -11,7 +11,7 @@ from rollover.cli.commands.common import app
 from rollover.system import own_code
 
 
-def _told(wanted: bool) -> None:
+def _print_version(wanted: bool) -> None:
     if wanted:
         from importlib.metadata import version
 
@@ -26,7 +26,7 @@ def root(
         typer.Option("--effects", metavar="FILE", help="A Python file with effects of your own; may be repeated."),
     ] = None,
     version: Annotated[
-        bool, typer.Option("--version", help="Say which version this is.", is_eager=True, callback=_told)
+        bool, typer.Option("--version", help="Say which version this is.", is_eager=True, callback=_print_version)
     ] = False,
     laws: Annotated[
         list[Path] | None,

@@ -61,7 +61,7 @@ def rops_(
 ) -> None:
     """Load over deflection of a frame given by its sections: the static sequence, hinges, collapse, verdict."""
     from rollover.assessment import results
-    from rollover.assessment.frame_json import FORMAT, file_of, json_of, scenario_of, told
+    from rollover.assessment.frame_json import FORMAT, faults_of, file_of, json_of, scenario_of
     from rollover.assessment.frame_test import frame_test
     from rollover.cli import console
     from rollover.spec import document
@@ -73,7 +73,7 @@ def rops_(
     about["origin"] = results.origin(file_of(name), folder, set_ or [])
     results.claim_report(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
     try:
-        with told(file_of(name)), console.counting("loads") as show:
+        with faults_of(file_of(name)), console.counting("loads") as show:
             found = frame_test(chosen, segments=segments, clamped=clamped, speed=speed or 0.0, progress=show)
     except ArithmeticError as e:
         console.say(f"{name}: {e}")

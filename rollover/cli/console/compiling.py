@@ -37,10 +37,10 @@ def compiling(cold: bool, *, every: float = EVERY) -> Iterator[None]:
 
 
 def _watch(kept: Path, before: int, ended: threading.Event, every: float) -> None:
-    began, told = clock.monotonic(), 0
+    began, reported = clock.monotonic(), 0
     while not ended.wait(every):
-        if (made := _kernels(kept) - before) > told:
-            told = made
+        if (made := _kernels(kept) - before) > reported:
+            reported = made
             say(f"{made} of about {KERNELS} kernels compiled in {clock.monotonic() - began:.0f} s")
 
 

@@ -36,6 +36,12 @@ def rops(answer: Mapping[str, Any], folder: str) -> None:
             )
         if e.get("mechanism_force") is not None:
             out.print(f"{e['name']}: mechanism at {1e-3 * e['mechanism_force']:.1f} kN")
+        for c in e.get("connections", []):
+            at = c["failed"]
+            more = (
+                "" if at is None else f": gives way at {1e3 * at['deflection']:.0f} mm and {1e-3 * at['force']:.1f} kN"
+            )
+            out.print(f"{e['name']}: use of {c['name']} {c['use']:.2f}{more}", style=None if at is None else "bold red")
     for said in answer["warnings"]:
         out.print(said, style="yellow")
     out.print(f"Results: {folder}")

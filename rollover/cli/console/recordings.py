@@ -24,9 +24,9 @@ def comparison(found: Sequence[Misfit], folder: str) -> None:
 
     styles = {"good": "", "fair": "yellow", "poor": "bold red"}
     out = terminal.out()
-    told = headline(found)
-    out.print(told.sentence, style="bold")
-    out.print(told.detail)
+    head = headline(found)
+    out.print(head.sentence, style="bold")
+    out.print(head.detail)
     for each in found:
         out.print(each.recording, style="bold")
         table = Table(box=None, pad_edge=False)

@@ -65,7 +65,7 @@ class Signal:
 
     @property
     def quiet(self) -> tuple[float, tuple[float, ...]]:
-        """Noise and autocorrelation of its quiet stretches; those that are held before these are told."""
+        """Noise and autocorrelation of its quiet stretches; those that are held before these are estimated."""
         return self.at_rest or (self.noise, self.ar)
 
     @property
@@ -247,7 +247,7 @@ class Dataset:
         return moved
 
     def worth(self, discontinuities: NDArray[np.int64]) -> Array:
-        """Weights (n,) of whitened samples: those whose past was forgiven are as wide as the noise itself."""
+        """Weights (n,) of whitened samples: those whose past was masked are as wide as the noise itself."""
         found: Array = (
             weights_after_discontinuities(discontinuities, *self._memories)
             if discontinuities.size

@@ -171,7 +171,7 @@ class Simulations:
     def moved(self, r: int, before: Point, after: Point, shift: float, slope: Array | None = None) -> Array | None:
         """How the prediction of recording r differs between two points, whitened; nothing where either jumps.
 
-        A jump that moves past a sample is no slope, and what is forgiven there follows the measurement. With `slope`,
+        A jump that moves past a sample is no slope, and what is masked there follows the measurement. With `slope`,
         dy/dtau (n,) before, SI, the two are compared as a clock would have them, see `clock_aligned_difference`.
         """
         keys = key_at(r, *before, shift), key_at(r, *after, shift)

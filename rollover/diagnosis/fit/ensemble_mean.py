@@ -121,9 +121,9 @@ def _line_search(problem: Problem, old: Fitted, dx: Array) -> tuple[Sequence[flo
 def _with_scatter_at(
     problem: Problem, slopes: Fitted, x: Sequence[float], shifts: Sequence[float], parts: int = 1
 ) -> tuple[Fitted, Fitted] | None:
-    """A fit as it stands at x and these time shifts (s) under the scatter of runs there, and where its slopes are told.
+    """A fit as it stands at x and these time shifts (s) under the scatter of runs there, and where its slopes hold.
 
-    Between the ends of the step over which those were told they are as good as its own. None if nothing can be
+    Between the ends of the step over which those were estimated they are as good as its own. None if nothing can be
     simulated there.
     """
     is_beside = problem.is_beside(x, slopes.x)

@@ -1,7 +1,7 @@
 """Slopes among runs that differ by chance: over both sides of a point, and over as wide a step as shows clearly more.
 
 Between two runs lies what the parameter does and what chance does. Over a narrow step that is mostly chance, which
-squares make look like a strong slope: steps too short, and intervals too narrow. Where a run jumps to another course on
+squares make look like a strong slope: steps too short, and intervals too narrow. Where a run jumps to another branch on
 one side, the other side alone tells what the parameter does. Where nothing is left to chance, as in drops, a narrow
 step is the better one, see `step_reduced`.
 
@@ -134,7 +134,7 @@ def difference_beyond_chance(e: Dataset, d: Array, chance: float) -> Array:
     """d sqrt(1 - chance/|d|^2) of samples after the impact: a difference (n,) of runs without what `chance` adds to it.
 
     Two runs that nobody could tell apart differ by so much; over the small steps of a narrow effect it is most of the
-    square, and counted as slope would tell a parameter better than it can be told. Before the impact none adds any.
+    square, and counted as slope would estimate a parameter better than can be. Before the impact none adds any.
     """
     found, late = d.copy(), ~e.early
     power = float(d[late] @ d[late])

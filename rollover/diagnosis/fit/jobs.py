@@ -18,7 +18,7 @@ from typing import Any, cast
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import linearised, polish, with_time_shift_search
-from rollover.diagnosis.fit.model_variants import as_variant, with_fitted_shape
+from rollover.diagnosis.fit.model_variants import as_variant, with_fitted_secondary
 from rollover.diagnosis.fit.tasks import Progress, R, T, Task, serial_map
 from rollover.diagnosis.fit.threshold_scan import with_threshold_traced
 from rollover.diagnosis.forward.interface import FailedModelError
@@ -194,9 +194,9 @@ def work(problem: Problem, task: Task) -> Fitted | None:
     if begun is None:
         return None
     leaves = [b.total for b in begun.blocks] if task.leaves is None else task.leaves
-    if task.how == "shape":
+    if task.how == "secondary":
         return (
-            with_fitted_shape(problem, begun, leaves)
+            with_fitted_secondary(problem, begun, leaves)
             if task.variant is None
             else as_variant(problem, begun, task.variant, leaves)
         )

@@ -124,7 +124,7 @@ def separate_minima(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tupl
     return chosen
 
 
-def starts_along_shape(last: Candidate, x: Sequence[float]) -> list[tuple[float, ...]]:
+def starts_along_secondary(last: Candidate, x: Sequence[float]) -> list[tuple[float, ...]]:
     """Places beside x all along each parameter of the shape of its last effect, the others as they usually are.
 
     A recording in which a face lets go, or does not, is met within a narrow stretch alone.

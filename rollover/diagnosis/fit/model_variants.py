@@ -19,7 +19,7 @@ TUNING = SETTINGS.fit.model_variants
 BESIDE_VARIANT = np.linspace(TUNING.threshold_low, TUNING.threshold_high, TUNING.threshold_count)
 
 
-def with_fitted_shape(problem: Problem, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
+def with_fitted_secondary(problem: Problem, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
     """The fit with the shape of its last effect, begun where short fits from some places leave least; None if none.
 
     None too where these come nowhere near what another explanation `leaves` of each recording; so in another form. On
@@ -106,7 +106,7 @@ def _best_from(
         ),
     )
     if sum(leaves) > TUNING.much_left**2 * sum(b.residual.size for b in f.blocks):
-        most = min(most, TUNING.shape_misfit * own)
+        most = min(most, TUNING.secondary_misfit * own)
     begun: list[Fitted] = []
     for one in sorted((one for one in short if one is not None and one.total < most), key=lambda one: one.total):
         if begun and one.total > TUNING.followed_misfit * begun[0].total:

@@ -62,7 +62,7 @@ class Candidate:
     @property
     def is_local(self) -> bool:
         """Whether it acts only near one point of its range."""
-        return bool(EFFECTS[self.id].narrow)
+        return bool(EFFECTS[self.id].local_starts)
 
     @property
     def is_discontinuous(self) -> bool:
@@ -77,7 +77,7 @@ class Candidate:
     @property
     def has_secondary(self) -> bool:
         """Whether secondary parameters are fitted too, or a variant of it is."""
-        return bool(self.variant) or not set(self.search).isdisjoint(EFFECTS[self.id].shapes)
+        return bool(self.variant) or not set(self.search).isdisjoint(EFFECTS[self.id].secondary)
 
     def is_fine(self, k: int) -> bool:
         """Whether the k-th parameter says where a local effect acts: scanned finely, over less about each point."""
@@ -152,7 +152,7 @@ class Candidate:
             # what the scenario has may be far above what ever acts: a yield force, a stop
             is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
             return [*beside, *((x,) for x in TUNING.limit_points if is_limit)]
-        axes, local = [], EFFECTS[self.id].narrow
+        axes, local = [], EFFECTS[self.id].local_starts
         for n, (name, search) in zip(null, self.search.items(), strict=True):
             if n is not None:
                 axes.append([min(n + 2.0 * TUNING.run_step, 0.9)])
@@ -199,7 +199,7 @@ class Candidate:
     def reshaped(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
         """The same along its shape as far as that is fitted, and its coordinates there: the way back from `plain`."""
         kind, values = EFFECTS[self.id], self.values(x)
-        names = tuple(name for name in self.search if name in kind.shapes)
+        names = tuple(name for name in self.search if name in kind.secondary)
         for name in names:
             values = {**kind.reshaped(values, name, getattr(kind(), name)), name: values[name]}
         return replace(self, along=names), coordinates(values, self.search)
@@ -222,7 +222,7 @@ class Candidate:
         """Coordinates of `whole` at which its fit may begin: the defaults of the secondary parameters, and others."""
         kind: Any = EFFECTS[self.id]()
         default = [_begun(getattr(kind, n), s) for n, s in self.secondary.items()]
-        points = [tuple(default), *itertools.product(*[TUNING.shape_starts] * len(default))]
+        points = [tuple(default), *itertools.product(*[TUNING.secondary_starts] * len(default))]
         return [(*x, *point) for point in points]
 
     def scan_points(self) -> list[tuple[float, ...]]:

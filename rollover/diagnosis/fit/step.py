@@ -12,6 +12,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.tasks import ParallelMap, Progress, R, T, Task, serial_map
+from rollover.diagnosis.settings import SETTINGS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,12 +46,21 @@ class Step:
     def cross_validated(
         self, problem: Problem, groups: Groups, parallel_map: ParallelMap[Problem] = serial_map
     ) -> Step:
-        """The same with held-out predictions by refits, where slopes do not hold for long; of drops its best alone."""
+        """The same with held-out predictions by refits, where slopes do not hold for long.
+
+        Of drops those of its best, and of what explains half as much: slopes at an end of a range may dismiss it.
+        """
         if problem.effort.is_ensemble:
             return self._each(lambda f: cross_validated(problem, f, groups))
-        return self.moved_to(
-            cross_validated_by_refits(problem, self.fitted, groups, held_out(self.base, groups).total, parallel_map)
-        )
+        without = held_out(self.base, groups).total
+        step = self.moved_to(cross_validated_by_refits(problem, self.fitted, groups, without, parallel_map))
+        least = SETTINGS.report.grades.half_share * (step.base.chi2 - step.fitted.chi2)
+
+        def again(f: Fitted) -> Fitted:
+            competes = f is not step.fitted and step.base.chi2 - f.chi2 > least
+            return cross_validated_by_refits(problem, f, groups, parallel_map=parallel_map) if competes else f
+
+        return replace(step, rivals=tuple(again(f) for f in step.rivals))
 
     def _each(self, made: Callable[[Fitted], Fitted]) -> Step:
         """The same with something made of each fit; its best stays one of its rivals."""

@@ -14,7 +14,7 @@ from rollover.diagnosis.fit.finite_differences import beside
 from rollover.diagnosis.fit.parameterisation import Candidate
 
 Progress = Callable[[str], None]
-How = Literal["fit", "polish", "shape", "time", "trace"]
+How = Literal["fit", "polish", "secondary", "time", "trace"]
 Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to where it is tried
 
 P = TypeVar("P")
@@ -40,10 +40,9 @@ class Task:
     """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Problem.fit`.
 
     One of few `rounds` ends without slopes.
-    "polish" follows a curved ridge from a start, "shape" fits the secondary parameters of the last effect too or takes
-    a `variant` of it, "time" scans the time shifts, "trace" begins anew where it sets in, over a `stretch`. What comes
-    nowhere near what the best fit `leaves` of each recording is not gone on with. `reused` as in
-    `Problem.fit`.
+    "polish" follows a curved ridge from a start, "secondary" fits the secondary parameters of the last effect too or
+    takes a `variant` of it, "time" scans the time shifts, "trace" begins anew where it sets in, over a `stretch`. What
+    comes nowhere near what the best fit `leaves` of each recording is not gone on with. `reused` as in `Problem.fit`.
     """
 
     how: How = "fit"

@@ -31,7 +31,7 @@ def threshold_ranges(fitted: Fitted) -> list[Stretch]:
     last, at = fitted.candidates[-1], len(fitted.x) - len(fitted.own)
     strength = strength_parameter(last.id, last.search)[0]
     if last.is_oscillatory:
-        names = [name for name in last.search if name in EFFECTS[last.id].shapes]
+        names = [name for name in last.search if name in EFFECTS[last.id].secondary]
     else:
         names = [name for name in last.search if (name == strength) == is_clock(fitted)]
     points = [at + list(last.search).index(name) for name in names]
@@ -83,7 +83,7 @@ def threshold_starts(
 def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
     """The fit begun anew where its last effect acts elsewhere, as strongly as recordings ask for there; never worse.
 
-    A threshold that moves past a sample leaves a misfit of many small valleys: it is tried all along its stretch, and
+    A threshold that moves past a sample leaves a misfit of many small minima: it is tried all along its stretch, and
     finely beside the fit, on few recordings. What rings keeps its frequency meanwhile.
     """
     if fitted.candidates[-1].is_oscillatory:
@@ -103,7 +103,7 @@ def with_threshold_traced(problem: Problem, fitted: Fitted, stretch: Stretch) ->
         chi2 = None if x is None else chi2_at(problem, fitted.candidates, x, shifts, few)
         if x is not None and chi2 is not None:
             met.append((chi2, x))
-    for x in _best_start(problem, fitted, _local_minima(met)[: TUNING.valleys], few):
+    for x in _best_start(problem, fitted, _local_minima(met)[: TUNING.minima], few):
         again = problem.fit(fitted.candidates, x, shifts=shifts, width=1)
         best = again if again is not None and again.chi2 < best.chi2 else best
     return best
@@ -131,7 +131,7 @@ def _along_frequency_ridge(problem: Problem, fitted: Fitted, stretch: Stretch) -
     few = representative_recordings(fitted)
     met = [(chi2, y) for y in there if (chi2 := chi2_at(problem, candidates, y, shifts, few)) is not None]
     best = fitted
-    for y in _local_minima(met)[: TUNING.valleys]:
+    for y in _local_minima(met)[: TUNING.minima]:
         new = problem.fit(candidates, y, shifts=shifts, width=1)
         if new is not None:
             plain = (*new.x[:at], *variant.plain(new.own)[1])

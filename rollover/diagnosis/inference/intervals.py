@@ -65,7 +65,7 @@ def between_recording_variance(dataset: Sequence[Dataset], blocks: Sequence[Resi
     return np.asarray(student_widening(number - 1) * number / (number - 1) * np.sum(moved**2, axis=0))
 
 
-def shape_variance(problem: Problem, fitted: Fitted, inverse: Array) -> Array:
+def secondary_variance(problem: Problem, fitted: Fitted, inverse: Array) -> Array:
     """Variances (p,) of what shapes of the last effect that are not fitted would move: each evenly over its range."""
     found = np.zeros(len(fitted.x))
     last, at = fitted.candidates[-1], list(fitted.x)
@@ -91,7 +91,7 @@ def with_secondary(problem: Problem, fitted: Fitted) -> tuple[Fitted, Array, lis
     """The fit with the shapes of its effects that were not fitted, the prior of each coordinate, where the fitted are.
 
     Such a shape is where it is usual, spread evenly over its range as far as the recordings do not tell; one that is
-    usually not there is left out, and where a look costs a run all are: see `shape_variance`.
+    usually not there is left out, and where a look costs a run all are: see `secondary_variance`.
     """
     candidates, x, primary, prior = [], list[float](), list[int](), list[float]()
     for c, columns in with_slices(fitted.candidates):
@@ -159,10 +159,7 @@ def _ways(fitted: Fitted, own: Array) -> list[Array]:
 
 
 def _rippled(fitted: Fitted) -> set[int]:
-    """Coordinates of effects in another shape or form than their usual one, which a threshold may make up for.
-
-    From sample to sample that a threshold passes the misfit rises and falls again, along a valley longer than one wave.
-    """
+    """Coordinates of effects in another form than their usual one: local minima of a threshold may make up for it."""
     secondary = (own for c, own in with_slices(fitted.candidates) if c.has_secondary)
     return {k for own in secondary for k in range(own.start, own.stop)}
 
@@ -250,7 +247,7 @@ def _within_range(problem: Problem, fitted: Fitted, wide: Array, dispersion: flo
 
 
 def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: float) -> Array:
-    """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `local_quadratic_extents`.
+    """How far (p, 2) the mean of runs beside the fit may be what was measured, see `local_quadratic_extents`.
 
     In units of `own` deviations down and up, NaN where runs do not tell. It has in it what scatter and disagreement do.
     """
@@ -317,10 +314,10 @@ def intervals(
     cov = phi A^-1, phi the misfit left per sample (at least 1); beside it, in quadrature, what a gain error of the
     model of `model_error` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
     that nobody could tell apart scatter and samples are weighed by that, cov = phi A^-1 N A^-1 with N the covariance
-    that the noise alone gives J'w; beside it stand `ensemble_variance` and `shape_variance`. Elsewhere unfitted shapes
-    are in A (`with_secondary`); an end of a range is read off where samples pile up. How far the misfit stays low is
-    found by `quadratic_extents` where runs scatter, else by `profile_extents`; with `sides` by the latter alone, others
-    as wide as slopes say. `coarse` is the fit that `refined_by_ensemble_mean` moved to this one.
+    that the noise alone gives J'w; beside it stand `ensemble_variance` and `secondary_variance`. Elsewhere unfitted
+    secondary parameters are in A (`with_secondary`); an end of a range is read off where samples pile up. How far the
+    misfit stays low is found by `quadratic_extents` where runs scatter, else by `profile_extents`; with `sides` by the
+    latter alone, others as wide as slopes say. `coarse` is the fit that `refined_by_ensemble_mean` moved to this one.
     """
     estimated, coarse = fitted, coarse or fitted
     fitted, prior, primary = with_secondary(problem, fitted)
@@ -345,7 +342,8 @@ def intervals(
     # a fit that ended before it was at rest is off by what the next step would have been
     rest = inverse @ sum((b.normal()[1] for b in fitted.blocks), np.zeros(p))
     if strayed:
-        moved += ensemble_variance(problem.dataset, fitted.blocks, inverse) + shape_variance(problem, fitted, inverse)
+        held = secondary_variance(problem, fitted, inverse)
+        moved += ensemble_variance(problem.dataset, fitted.blocks, inverse) + held
         rest = ensemble_mean_step(problem.dataset, fitted.blocks)
     moved += rest**2
     moved[primary] += ((np.array(estimated.x) - np.array(coarse.x)) / (SETTINGS.fit.ensemble_mean.finer_parts - 1)) ** 2

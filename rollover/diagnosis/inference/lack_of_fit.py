@@ -76,7 +76,7 @@ class Cell:
 class Mismatch:
     """All cells, the p-value of "nothing but noise", and the familywise p-values of the cells.
 
-    `telling` are the cells that it is judged by: not those after an impact of a recording that took another course.
+    `telling` are the cells that it is judged by: not those after an impact of a recording that took another trajectory.
     """
 
     cells: tuple[Cell, ...]
@@ -118,7 +118,7 @@ def mismatch_of(
                     if signal.weight is not None:
                         due = Expected(signal.weight[inside], rest, perturbed[r][:, rows], worth[r][:, rows])
                     cells.append(_cell(r, signal.channel, name, time[inside], rows, block, line_spectrum, due))
-    # after an impact a recording that took another course tells nothing by itself
+    # after an impact a recording that took another trajectory tells nothing by itself
     other = [has_diverged(b.heavy_tail) for b in blocks]
     telling = [c for c in cells if not (other[c.recording] and c.start >= dataset[c.recording].first_impact)]
     # within half a step of its digits a channel tells nothing, however alike neighbouring samples err

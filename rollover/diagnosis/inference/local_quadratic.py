@@ -1,4 +1,4 @@
-"""How far a parameter may lie where runs are rough: the mean course of many runs beside a fit, not slopes at one.
+"""How far a parameter may lie where runs are rough: the mean of many runs beside a fit, not slopes at one.
 
 Runs that scatter leave a misfit that differs from place to place by chance. The place that a fit ended at is the lowest
 of all that were tried, and slopes J there are those of its dip: two runs side by side differ by their scatter too. At
@@ -48,11 +48,11 @@ def student_widening(free: float) -> float:
 
 
 def local_quadratic_extents(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[float, float] | None:
-    """How far (t, down and up) the mean course of runs may be what was measured, by (R1) to (R3).
+    """How far (t, down and up) the mean of runs may be what was measured, by (R1) to (R3).
 
     `slopes` (n,) are those at the fit, of each recording by t, of samples that count in full. Nought both where they
-    are surely right, for then they tell more. None where that is not told: no slope stands out within the places that
-    are looked at, more and more until one is told well.
+    are surely right, for then they tell more. None where none is estimated: no slope stands out within the places that
+    are looked at, more and more until one is estimated well.
     """
     met: list[tuple[float, Sequence[ResidualBlock]]] = []
     best = Slope(clear=0.0)
@@ -66,7 +66,7 @@ def local_quadratic_extents(runs: Runs, slopes: Sequence[Array], due: float) -> 
         each = zip(*(blocks for _, blocks in met), strict=True)
         recordings = [_alike(blocks, nearest, J) for blocks, J in zip(each, slopes, strict=True)]
         squares = sum(np.sum(left**2, axis=1) for left, _ in recordings)
-        # not the least: one run may take the recording's own course
+        # not the least: one run may take the recording's own trajectory
         low = np.sort(squares)[TUNING.least_points // 2 - 1]
         inliers = np.abs(squares - low) < TUNING.outlier_ratio * due * t**2 + TUNING.outlier_rise * due
         if np.sum(inliers) < TUNING.least_points:

@@ -23,7 +23,7 @@ from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, MOST, spoken, units_of
 from rollover.recording import Recording
 from rollover.recording.checks.finding import Finding, trace
-from rollover.recording.checks.leaps import leaping
+from rollover.recording.checks.jumps import jumping
 from rollover.recording.checks.samples import clipping, stuck
 from rollover.spec.channels import describe
 
@@ -145,7 +145,7 @@ def _breaks(recording: Recording, channel: str) -> Iterator[tuple[float, float]]
     yield from ((f.start, f.end) for f in stuck(channel_trace, "") if f.value == 0.0)
     yield from (
         (float(channel_trace.time[k - 1]), float(channel_trace.time[k]))
-        for k in leaping(channel_trace, recording.cfc.get(channel))
+        for k in jumping(channel_trace, recording.cfc.get(channel))
     )
 
 
@@ -193,7 +193,7 @@ def _named(channel: str, tops: Sequence[tuple[int, Finding]]) -> Named:
     return Named(
         id=ID,
         kind=kind.kind,
-        statement=kind(channel=channel, limit=limit).says(),
+        statement=kind(channel=channel, limit=limit).statement(),
         parameters={
             "limit": Interval(
                 value=limit,

@@ -83,11 +83,27 @@ class ForwardModel(Protocol):
     terms: Sequence[Term]
 
     def simulate(self, time: Array, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Mapping[str, Array]:
-        """Outputs (n,) by channel at the stamps `time` (n,), s, of inputs (n,) by channel, all in SI.
+        """Simulate one recording; the same arguments give the same outputs.
 
-        `values` has all parameters by name, those of a term as "TERM.PARAMETER", at their nulls (or starts, without
-        one) where the term is not there, and the recording's conditions. The same arguments give the same outputs. What
-        is not finite, and an ``ArithmeticError``, says that there is no solution for these values.
+        Parameters
+        ----------
+        time
+            Stamps (n,), s.
+        inputs
+            Recorded inputs (n,) by channel, SI.
+        values
+            All parameters by name, those of a term as "TERM.PARAMETER", at their nulls (or starts, without one) where
+            the term is not there, and the recording's conditions, SI.
+
+        Returns
+        -------
+        Mapping
+            Outputs (n,) by channel, SI. What is not finite says that there is no solution for these values.
+
+        Raises
+        ------
+        ArithmeticError
+            Where there is no solution for these values.
         """
 
 

@@ -16,8 +16,7 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.planning.planned import Instruments, planned, showing
-from rollover.diagnosis.planning.separation import Tests
-from rollover.diagnosis.planning.strength import choice
+from rollover.diagnosis.planning.separation import Tests, choice
 from rollover.diagnosis.result import NextTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import COLUMNS, unfit
@@ -100,7 +99,7 @@ def varied(scenario: Scenario) -> str:
 
 def cheapest(tried: Sequence[NextTest]) -> NextTest | None:
     """The gentlest test that is sure enough, else the surest; None of none."""
-    sure = [t for t in tried if t.probability >= TUNING.told_apart]
+    sure = [t for t in tried if t.probability >= TUNING.distinguishable]
     return min(sure, key=lambda t: t.value) if sure else max(tried, key=lambda t: t.probability, default=None)
 
 
@@ -109,7 +108,7 @@ def advice(grid: Grid, one: Placed, other: Placed, probability: float) -> Advice
     a, b = one[0], other[0]
     known = EFFECTS[a.id].rivals.get(b.id) or EFFECTS[b.id].rivals.get(a.id) or ""
     tried: list[NextTest] = []
-    if probability >= TUNING.told_apart:
+    if probability >= TUNING.distinguishable:
         return _advice((a.key, b.key), probability, None, tried, known)
     for level in grid.levels():
         for instruments in level:
@@ -121,7 +120,7 @@ def advice(grid: Grid, one: Placed, other: Placed, probability: float) -> Advice
                 channels = tuple(instruments.noise)
                 tried.append(grid.test(value, channels, instruments.rate, chance))
         best = cheapest(tried)
-        if best is not None and best.probability >= TUNING.told_apart:
+        if best is not None and best.probability >= TUNING.distinguishable:
             break
     return _advice((a.key, b.key), probability, cheapest(tried), tried, known)
 
@@ -137,7 +136,7 @@ def chance_of(dataset: Sequence[Dataset], one: Placed, other: Placed) -> float:
 def _advice(
     effects: tuple[str, str], probability: float, best: NextTest | None, tried: Sequence[NextTest], known: Any
 ) -> Advice:
-    is_enough = max(probability, 0.0 if best is None else best.probability) >= TUNING.told_apart
+    is_enough = max(probability, 0.0 if best is None else best.probability) >= TUNING.distinguishable
     return Advice(
         effects=effects, probability=probability, best=best, is_enough=is_enough, tried=tuple(tried), known=known
     )

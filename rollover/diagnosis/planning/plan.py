@@ -12,8 +12,9 @@ from rollover.diagnosis.fit.parameterisation import Candidate, is_limit, null_of
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.planning.next_test import Advice, Grid, advice, varied
 from rollover.diagnosis.planning.planned import Instruments, planned
-from rollover.diagnosis.planning.separation import Apart, Tests
-from rollover.diagnosis.planning.strength import (
+from rollover.diagnosis.planning.separation import (
+    Apart,
+    Tests,
     detection,
     of_one,
     point_where_it_acts,
@@ -87,7 +88,7 @@ class Plan:
     false_alarm: float
     size: float
     noncentrality: float
-    told_apart: float
+    distinguishable: float
     effects: tuple[Detectable, ...]
     pairs: tuple[Pair, ...]
     next_tests: tuple[Advice, ...]
@@ -98,7 +99,7 @@ class Plan:
 
     def confused(self) -> list[Pair]:
         """Pairs that are not told apart, the worst first."""
-        return sorted((p for p in self.pairs if p.probability < self.told_apart), key=lambda p: p.probability)
+        return sorted((p for p in self.pairs if p.probability < self.distinguishable), key=lambda p: p.probability)
 
     @property
     def times(self) -> float:
@@ -164,7 +165,7 @@ def plan(
         false_alarm=TUNING.false_alarm,
         size=size,
         noncentrality=enough,
-        told_apart=TUNING.told_apart,
+        distinguishable=TUNING.distinguishable,
         effects=tuple(effects),
         pairs=tuple(pairs),
         next_tests=tuple(found_tests),
@@ -249,7 +250,7 @@ def _closest(pairs: Sequence[Pair]) -> list[tuple[str, str]]:
     mean = {tuple(sorted((p.effect, p.rival))): 0.0 for p in pairs}
     for a, b in mean:
         mean[a, b] = _mean(pairs, a, b)
-    close = sorted((value, pair) for pair, value in mean.items() if value < TUNING.told_apart)
+    close = sorted((value, pair) for pair, value in mean.items() if value < TUNING.distinguishable)
     return [(a, b) for _, (a, b) in close[: TUNING.few]]
 
 
@@ -263,7 +264,7 @@ def json_of(found: Plan, about: Mapping[str, Any] | None = None) -> dict[str, An
             **(about or {}),
             **fields,
             "effects": effects,
-            "pairs": [{**p, "is_told_apart": p["probability"] >= found.told_apart} for p in pairs],
+            "pairs": [{**p, "is_distinguishable": p["probability"] >= found.distinguishable} for p in pairs],
             "next_tests": tests,
             "versions": versions(),
         }

@@ -54,12 +54,12 @@ def candidates_of(
             found += [c for c in heard if c.id == name]
             continue
         sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}
-        wide = {p: s if p in kind.shapes else _widened(s, kind.null.get(p)) for p, s in sized.items()}
+        wide = {p: s if p in kind.secondary else _widened(s, kind.null.get(p)) for p, s in sized.items()}
         there = {p: own for p, w in wide.items() if (own := kind.looked_for(p, w, tried)) is not None}
-        search = {p: s for p, s in there.items() if p not in kind.shapes}
+        search = {p: s for p, s in there.items() if p not in kind.secondary}
         if not search:
             continue
-        secondary = {p: there[p] for p in kind.shapes if p in there}
+        secondary = {p: there[p] for p in kind.secondary if p in there}
         unlike = {} if scenario is None else {p: _null_coordinate(kind, p, s, scenario) for p, s in search.items()}
         null = None if acts == "drop" else tuple(unlike.get(p) for p in search)
         held = {p: physical(x, search[p]) for p, x in unlike.items() if x is not None and kind.null.get(p) is None}
@@ -86,8 +86,8 @@ def of_sensors(dataset: Sequence[Dataset]) -> list[Candidate]:
             id=name,
             kind=kind.kind,
             family=kind.family,
-            search={p: s for p, s in ranges.items() if p not in kind.shapes},
-            secondary={p: s for p, s in ranges.items() if p in kind.shapes},
+            search={p: s for p, s in ranges.items() if p not in kind.secondary},
+            secondary={p: s for p, s in ranges.items() if p in kind.secondary},
             channel=of.channel,
         )
         for name, kind in EFFECTS.items()

@@ -18,12 +18,17 @@ from rollover.diagnosis.inference.lack_of_fit import Mismatch, is_enough, is_tol
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.ensemble_validation import counted_in_full, significant_by_wald
 from rollover.diagnosis.selection.explanation import Explanation, kind_of, strongest, with_conditions_refitted
-from rollover.diagnosis.selection.flexibility import is_a_curve, is_flexible_soil, is_over_flexible, is_straight_line
 from rollover.diagnosis.selection.forward_step import largest_change
 from rollover.diagnosis.selection.pairs import best_subsets, with_first_replaced
-from rollover.diagnosis.selection.simplification import followed, with_mirror_rivals
-from rollover.diagnosis.selection.stepwise import forward_selection
-from rollover.diagnosis.selection.truncated_start import loading_first
+from rollover.diagnosis.selection.simplification import (
+    followed,
+    is_a_curve,
+    is_flexible_soil,
+    is_over_flexible,
+    is_straight_line,
+    with_mirror_rivals,
+)
+from rollover.diagnosis.selection.stepwise import forward_selection, loading_first
 from rollover.diagnosis.settings import SETTINGS
 
 TUNING = SETTINGS.selection.decision

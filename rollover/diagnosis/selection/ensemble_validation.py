@@ -37,7 +37,7 @@ def restarted_base(problem: Problem, base: Fitted) -> Fitted:
 
 
 def with_full_weights(problem: Problem, fitted: Fitted) -> Fitted:
-    """A fit with all samples counted in full if more recordings took another course than chance sends there.
+    """A fit with all samples counted in full if more recordings took another trajectory than chance sends there.
 
     What so many do together is missing from the simulation, and where they went tells what.
     """
@@ -53,9 +53,9 @@ def with_full_weights(problem: Problem, fitted: Fitted) -> Fitted:
 
 
 def counted_in_full(problem: Problem, base: Fitted) -> Fitted:
-    """A base as an explanation is held against it: in full where its recordings took other courses by more than chance.
+    """A base as an explanation is held against it: in full where its recordings diverged by more than chance.
 
-    Those were forgiven for want of an explanation alone; forgiven they leave no more than the best there is.
+    Those were weighted down for want of an explanation alone; so they leave no more than the best there is.
     """
     found = with_full_weights(problem, base)
     problem.heavy_tailed = True
@@ -115,9 +115,9 @@ def judged_before_impact(problem: Problem, found: Step) -> Step:
 
 
 def is_significant_as_held(problem: Problem, fitted: Fitted) -> bool:
-    """`is_there` with other courses forgiven if that is how the effect will be held, though it was found in full.
+    """`is_there` with diverged recordings weighted down if the effect will be held so, though it was found in full.
 
-    What one recording on another course asks for is not what the others do.
+    What one recording on another trajectory asks for is not what the others do.
     """
     if problem.heavy_tailed:
         return is_there(problem, fitted)

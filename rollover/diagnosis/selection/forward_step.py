@@ -35,6 +35,7 @@ from rollover.diagnosis.selection.screening import (
 )
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.settings.forward import Effort
+from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.selection.forward_step
@@ -230,7 +231,7 @@ def _elsewhere_of(base: Fitted) -> list[tuple[float, ...]]:
 
 
 def _robust_short_fits(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[int]) -> list[Fitted]:
-    """Fits to few recordings with other courses forgiven, as they stand in full.
+    """Fits to few recordings with diverged ones weighted down, as they stand in full.
 
     Where runs part ways what is left in full jumps from place to place, and a fit ends at the first dip.
     """
@@ -257,14 +258,14 @@ def _chosen(screened: Sequence[Screened], effort: Effort, scored: ScoreTest) -> 
     by_key = {s.candidate.key: s for s in screened}
     ranked = [by_key[c.key] for c in scored.ranked([s.candidate for s in screened])]
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
-    reading = [s for s in ranked if s.candidate.kind == "sensor"]
+    of_sensors = [s for s in ranked if s.candidate.kind == "sensor"]
     related = of_same_family([s.candidate for s in moving], effort.promising, effort.leaders)
 
     def score(s: Screened) -> float:
         return scored.scores.get(s.candidate.key, 0.0)
 
     able = []
-    for own in (moving, reading):
+    for own in (moving, of_sensors):
         least = TUNING.least_score * max(map(score, own), default=0.0)
         begun_well = [s for s in by_start if s in own]
         able += [
@@ -287,7 +288,7 @@ def _other_minimum(fits: Sequence[Fitted]) -> list[Fitted]:
 def largest_change(problem: Problem, base: Fitted, fitted: Fitted) -> float:
     """How far the added effect moves any channel of any recording, largest root mean square over the range.
 
-    Within half a step of a channel's digits nothing is told to have moved.
+    Within half a step of a channel's digits nothing counts as moved.
     """
     return _run_distance(problem, base.blocks, fitted.blocks)
 
@@ -334,12 +335,13 @@ def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitt
     return [first, *(f for f in fits if f is not first)]
 
 
-def confusion_set(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
+def confusion_set(step_: Step, groups: Groups, shared: float = 1.0, *, is_refuted: bool = False) -> list[Fitted]:
     """Rivals that predict held-out recordings as well as the best does, the best first.
 
     And those of no more numbers that meet all recordings as well as it does: what hangs on a single one is hard to
     predict without it, and not wrong for that. None that becomes the best itself at the end of its range, as a layer
-    whose top is the ground's.
+    whose top is the ground's. Where what the best leaves refutes its form (`is_refuted`), which of its family has the
+    right one is not told by who leaves least: those that explain nearly all that it does are rivals too.
     """
     best, base = step_.fitted, step_.base
     found = [best]
@@ -349,8 +351,25 @@ def confusion_set(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitt
         becomes_best = (
             len(rival.x) > len(best.x) and rival.chi2 > best.chi2 - TUNING.excluded_errors**2 and is_at_bound(rival)
         )
-        if rival is best or becomes_best or not explains:
+        if rival is best:
+            continue
+        if is_refuted and is_same_family(rival, best) and explains_nearly_all(step_, rival, groups):
+            found.append(rival)
+            continue
+        if becomes_best or not explains:
             continue
         if as_well or min(held_out_disadvantage(rival, best, groups, shared)) < TUNING.excluded_errors:
             found.append(rival)
     return found
+
+
+def is_same_family(rival: Fitted, best: Fitted) -> bool:
+    """Whether two fits' effects are of one family, and the one does not become the other at an end of its range."""
+    one, other = rival.candidates[-1], best.candidates[-1]
+    return one.family == other.family and not (is_at_bound(rival) and other.id in EFFECTS[one.id].becomes)
+
+
+def explains_nearly_all(step_: Step, rival: Fitted, groups: Groups) -> bool:
+    """Whether a rival gains nearly all of what the best does on conditions held out."""
+    start, least, left = (float(held_out(f, groups).chi2.sum()) for f in (step_.base, step_.fitted, rival))
+    return start - left >= SETTINGS.report.grades.nearly_all * (start - least)

@@ -16,13 +16,17 @@ from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.fit.threshold_scan import has_threshold, threshold_ranges, threshold_starts
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, is_enough, mismatch_of
-from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.forward_step import step, with_noise_of_fit
 from rollover.diagnosis.selection.restarts import continued_from, with_secondary_parameters
-from rollover.diagnosis.selection.scan import score_candidates
 from rollover.diagnosis.selection.score_test import ScoreTest
-from rollover.diagnosis.selection.screening import is_far
-from rollover.diagnosis.selection.simplification import followed, in_usual_shape, mirror_images, simpler
+from rollover.diagnosis.selection.screening import is_far, score_candidates
+from rollover.diagnosis.selection.simplification import (
+    followed,
+    in_usual_form,
+    is_over_flexible,
+    mirror_images,
+    simpler,
+)
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
@@ -47,12 +51,12 @@ def best_subsets(
     found, mismatch = followed(inquiry, pair)
     if not is_enough(problem, found.fitted, mismatch) and any(c.is_oscillatory for c in found.fitted.candidates):
         # what its shape shows now did not show beside another one
-        ringing = (
+        oscillatory = (
             found.fitted
             if found.fitted.candidates[-1].is_oscillatory
             else problem.again(first_effect_last(found.fitted))
         )
-        other = with_first_replaced(inquiry, ringing)
+        other = with_first_replaced(inquiry, oscillatory)
         if other is not None and other.fitted.chi2 < found.fitted.chi2:
             found, mismatch = followed(inquiry, other)
     if is_whole and costs(problem, found.fitted, current) > SETTINGS.selection.ensemble_validation.least_gain:
@@ -224,7 +228,7 @@ def _with_secondary_fitted(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fi
     lead = min(pairs, key=lambda f: f.chi2)
     near = [f for f in able if f.chi2 < TUNING.same_misfit * lead.chi2 and f.candidates[-1].secondary]
     leaves = tuple(b.total for b in lead.blocks)
-    made = inquiry.fits([replace(continued_from(f, "shape"), leaves=leaves) for f in near])
+    made = inquiry.fits([replace(continued_from(f, "secondary"), leaves=leaves) for f in near])
     return [f for f in made if f is not None]
 
 
@@ -258,9 +262,7 @@ def _mirrored(inquiry: Inquiry, pair: Fitted) -> list[Fitted]:
         if not EFFECTS[way.candidates[-1].id].mirrors:
             continue
         other = way.candidates[0]
-        (other, _), x = in_usual_shape(
-            way, usual, (0,) if usual[other.key].search.keys() <= other.search.keys() else ()
-        )
+        (other, _), x = in_usual_form(way, usual, (0,) if usual[other.key].search.keys() <= other.search.keys() else ())
         found += mirror_images(inquiry, way, (other,), x[: len(other.search)])
     return found
 

@@ -18,7 +18,7 @@ from rollover.diagnosis.fit.local_search import (
     representative_recordings,
     separate_minima,
     smallest_misfit,
-    starts_along_shape,
+    starts_along_secondary,
 )
 from rollover.diagnosis.fit.model_variants import enough, is_noise
 from rollover.diagnosis.fit.parameterisation import Candidate
@@ -56,7 +56,7 @@ def _recheck_promising(
             and gains.get(c.key, 0.0) < TUNING.promised_share * score
         ):
             points.append((c, (*base.x, *scored.starts.get(c.key, c.starts())[0])))
-    return _with_shape_starts(inquiry, base, fits, points, shifts)
+    return _with_secondary_starts(inquiry, base, fits, points, shifts)
 
 
 def _damping_frequency_scan(
@@ -141,10 +141,10 @@ def _refit_on_few(
     best_middle = partial(_best_middle, beside=base.candidates, shifts=tuple(shifts), most=most)
     met = zip(able, inquiry.parallel_map(best_middle, list(zip(able, begun, strict=True))), strict=True)
     points = [(c, x) for c, x in met if x is not None]
-    return _with_shape_starts(inquiry, base, fits, points, shifts)
+    return _with_secondary_starts(inquiry, base, fits, points, shifts)
 
 
-def _with_shape_starts(
+def _with_secondary_starts(
     inquiry: Inquiry,
     base: Fitted,
     fits: Sequence[Fitted],
@@ -156,7 +156,7 @@ def _with_shape_starts(
     They are begun where least is left all along each parameter of the shape. One that comes nowhere near what the best
     fit leaves is not gone on with.
     """
-    sets = [((*base.candidates, c.whole()), starts_along_shape(c, x)) for c, x in points]
+    sets = [((*base.candidates, c.whole()), starts_along_secondary(c, x)) for c, x in points]
     parts = [(candidates, tuple(every[k :: TUNING.parts])) for candidates, every in sets for k in range(TUNING.parts)]
     met = inquiry.parallel_map(partial(smallest_misfit, shifts=tuple(shifts)), parts)
     tasks = []
@@ -226,9 +226,11 @@ def with_secondary_parameters(inquiry: Inquiry, base: Fitted, fits: Sequence[Fit
         is_near = f.chi2 < TUNING.shaped_misfit * best or ahead < TUNING.shaped_misfit * min(held)
         if not is_near or base.chi2 - f.chi2 < TUNING.least_share * (base.chi2 - size):
             continue
-        tasks = [continued_from(f, "shape")] if f.candidates[-1].secondary else []
+        tasks = [continued_from(f, "secondary")] if f.candidates[-1].secondary else []
         tasks += (
-            [] if is_whole else [replace(continued_from(f, "shape"), variant=c) for c in f.candidates[-1].variants()]
+            []
+            if is_whole
+            else [replace(continued_from(f, "secondary"), variant=c) for c in f.candidates[-1].variants()]
         )
         ways += [(k, replace(task, leaves=tuple(b.total for b in lead.blocks))) for task in tasks]
     made: dict[int, list[Fitted]] = {}

@@ -169,7 +169,7 @@ def _scaled_start(c: Candidate, x: tuple[float, ...], factor: float) -> ScanPoin
 def _best_amplitude(misfit: Array, D: Array, blocks: Sequence[ResidualBlock]) -> tuple[Array, Array]:
     """How far along each unit direction (n, m) is best, (m,), and what that gains, (m,), noise units.
 
-    z and z^2, z = d'n, where all samples count in full. Where recordings took another course more may be gained further
+    z and z^2, z = d'n, where all samples count in full. Where recordings diverged more may be gained further
     on (D12): as far as each of them asks for is tried.
     """
     along = D.T @ misfit
@@ -202,7 +202,7 @@ def _birge_ratio(misfit: Array, D: Array, sizes: Sequence[int]) -> Array:
     """How far recordings of `sizes` rows disagree on how much there is of each direction (n, m): Birge's ratio, (m,).
 
     With a_r = d_r'w_r/|d_r|^2 the amplitude by recording r and a that by all, sum_r |d_r|^2 (a_r - a)^2 over the number
-    of recordings but one, at least 1. A run that took another course asks for much of some effect, and does so alone.
+    of recordings but one, at least 1. A run that diverged asks for much of some effect, and does so alone.
     """
     parts = _stacked(sizes)
     along = np.array([D[p].T @ misfit[p] for p in parts])

@@ -1,23 +1,33 @@
-"""What a step leads to where its fit is followed to the end, and whether an effect of fewer numbers ends there too."""
+"""What a step leads to where its fit is followed to the end, and whether an effect of fewer numbers ends there too.
+
+Over-flexible are explanations that could fit any curve: as many effects as may be of one sensor or of the soil, or two
+that both take another form than their usual one; of one sensor gain and offset make a straight line, and no more.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.linearisation import Fitted, first_effect_last, is_at_bound
+from rollover.diagnosis.fit.linearisation import Fitted, first_effect_last, is_at_bound, without_shift_direction
 from rollover.diagnosis.fit.local_search import ended, polish, with_time_shift_search, without_effect
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinates, with_slices
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
-from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.restarts import continued_from, with_thresholds_traced
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
 TUNING = SETTINGS.selection.simplification
+Array = NDArray[np.float64]
+STRAIGHT = ("sensor-gain", "sensor-scale", "sensor-bias")
+BACK = ("soil-elastic-rebound", "soil-adhesion")  # effects of the soil that act on the way back alone
+FLEXIBILITY = SETTINGS.selection.flexibility
 
 
 def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
@@ -110,7 +120,7 @@ def _with_usual_secondary(inquiry: Inquiry, found: Step) -> Step | None:
         return None
     shifts, ways = tuple(b.shift for b in best.blocks), [varied, *([k] for k in varied if len(varied) > 1)]
     tasks = [
-        Task(candidates=c, start=x, shifts=shifts, width=1) for c, x in (in_usual_shape(best, usual, w) for w in ways)
+        Task(candidates=c, start=x, shifts=shifts, width=1) for c, x in (in_usual_form(best, usual, w) for w in ways)
     ]
     fits = [f for f in inquiry.fits(tasks) if f is not None and _is_as_good(f, best)]
     if not fits:
@@ -203,7 +213,7 @@ def _mirrors(
             yield c, coordinates(there, c.search)
 
 
-def in_usual_shape(
+def in_usual_form(
     fitted: Fitted, usual: Mapping[str, Candidate], which: Sequence[int]
 ) -> tuple[tuple[Candidate, ...], tuple[float, ...]]:
     """Effects of a fit, `which` of them in their usual shape, and where they stand."""
@@ -230,3 +240,79 @@ def _is_as_good(simple: Fitted, best: Fitted) -> bool:
     """Whether a fit of fewer numbers leaves hardly more than the best."""
     dispersion = max(1.0, best.chi2 / sum(b.residual.size for b in best.blocks))
     return simple.chi2 < best.chi2 + dispersion * TUNING.chi_square * (len(best.x) - len(simple.x))
+
+
+def is_a_curve(problem: Problem, fitted: Fitted) -> bool:
+    """Whether effects that make a straight line of a channel leave a curve of it, or one that drifts."""
+    channels = {str(c.channel) for c in fitted.candidates if c.id in STRAIGHT}
+    return any(
+        curvature_gain(problem, fitted, channel, term) > FLEXIBILITY.curve_gain
+        for channel in sorted(channels)
+        for term in (square, drift)
+    )
+
+
+def is_straight_line(candidates: Sequence[Candidate]) -> bool:
+    """Whether all of several effects make a straight line of one channel."""
+    return len({c.channel for c in candidates}) == 1 and all(c.id in STRAIGHT for c in candidates)
+
+
+def square(read: Array, time: Array) -> Array:
+    """What a sensor of curved characteristic adds to what is read (n,)."""
+    del time
+    return read * read
+
+
+def drift(read: Array, time: Array) -> Array:
+    """What one adds whose gain changes as it warms, at times (n,) s."""
+    return np.asarray(read * (time - time.mean()))
+
+
+def curvature_gain(
+    problem: Problem, fitted: Fitted, channel: str, term: Callable[[Array, Array], Array] = square
+) -> float:
+    """Gain of a term in what a channel reads, over its range, beside all effects of a fit and the time shifts.
+
+    Of noise alone it is chi-square of one degree of freedom: z = q'e/|q|, q the term, whitened, freed of the fit's
+    own directions; less where runs scatter, whose samples count less than their scatter asks for.
+    """
+    terms, misfits, held = [], [], []
+    for r, block in enumerate(fitted.blocks):
+        raw = problem.raw(r, fitted.candidates, fitted.x, block.shift)
+        if raw is None:
+            return 0.0
+        e, added = problem.dataset[r], np.zeros_like(raw)
+        for signal, part in e.spans():
+            if signal.channel == channel:
+                added[part] = term(raw[part] / signal.span, e.recording.time[signal.rows])
+        own = np.column_stack([block.counted(e.whitened(added)), block.residual, block.J])
+        own = without_shift_direction(own, block)
+        terms.append(own[:, 0])
+        misfits.append(own[:, 1])
+        held.append(own[:, 2:])
+    q, misfit = np.concatenate(terms), np.concatenate(misfits)
+    basis, _ = np.linalg.qr(np.concatenate(held))
+    q, misfit = q - basis @ (basis.T @ q), misfit - basis @ (basis.T @ misfit)
+    return float((q @ misfit) ** 2 / max(float(q @ q), 1e-300))
+
+
+def is_over_flexible(candidates: Sequence[Candidate]) -> bool:
+    """Whether they draw any curve: as many effects as may be, all of one sensor or of the soil, or two bent ones.
+
+    Two effects of the soil that both take another form than their usual one are curves enough, whatever joins them. The
+    soil draws one on the way down and another on the way back.
+    """
+    subjects = [c.channel or _subject(c) for c in candidates]
+    varied = [s for s, c in zip(subjects, candidates, strict=True) if c.has_secondary]
+    return (len(candidates) == FLEXIBILITY.most_effects and len(set(subjects)) == 1) or len(set(varied)) < len(varied)
+
+
+def _subject(c: Candidate) -> str:
+    """What an effect is of that is no sensor's."""
+    return "way back" if c.id in BACK else "soil" if c.id.startswith("soil-") else c.id
+
+
+def is_flexible_soil(candidates: Sequence[Candidate]) -> bool:
+    """Whether several are of the soil, and one of these takes another shape or form than its usual one."""
+    soil = [c for c in candidates if c.id.startswith("soil-")]
+    return len(soil) > 1 and any(c.has_secondary for c in soil)

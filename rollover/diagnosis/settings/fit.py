@@ -112,7 +112,7 @@ class ModelVariants:
     followed_misfit: float = 1.5  # ratio to the best short fit's misfit: up to it others are followed; chosen
     much_left: float = 2.0  # misfit over the noise: from it on much is left; chosen
     # ratio to an effect's misfit without a shape: a short fit with its true shape leaves less; chosen
-    shape_misfit: float = 0.95
+    secondary_misfit: float = 0.95
     same_point: float = 0.003  # coordinate (0 to 1): two short fits within it have met; chosen
     same_misfit: float = 0.01  # relative difference of misfits: fits near each other within it will meet; chosen
     # ratio to what another explanation leaves: above it a curved valley is not followed; chosen
@@ -144,7 +144,7 @@ class Parameterisation:
     """Coordinates of an effect and where its fits begin."""
 
     # coordinates (0 to 1) of a shape at which fits begin; chosen
-    shape_starts: tuple[float, ...] = (0.1, 0.3, 0.5, 0.7, 0.9)
+    secondary_starts: tuple[float, ...] = (0.1, 0.3, 0.5, 0.7, 0.9)
     zero_step: float = 0.01  # coordinate (0 to 1): step off an effect's zero at which it is looked at; chosen
     # coordinates (0 to 1): steps at which a clock is looked at; chosen
     clock_steps: tuple[float, ...] = (0.08, 0.16, 0.3)
@@ -164,7 +164,7 @@ class Parameterisation:
 class ThresholdScan:
     """Scan over a threshold."""
 
-    valleys: int = 3  # minima on either side in which fits begin; chosen
+    minima: int = 3  # minima on either side in which fits begin; chosen
     short_rounds: int = 4  # rounds of a fit that shows whether a minimum is worth more; chosen
     wide_count: int = 80  # places over the whole range; chosen
     near_step: float = 0.002  # coordinate (0 to 1): distance of places about a fit; chosen

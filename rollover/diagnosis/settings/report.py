@@ -107,7 +107,7 @@ class Planning:
 
     power: float = 0.9  # probability: what is seen less often is not called detectable; usual in the design of tests
     false_alarm: float = 0.05  # probability that noise alone shows any effect; usual in the design of tests
-    told_apart: float = 0.95  # probability: from it on a test separates two effects; chosen
+    distinguishable: float = 0.95  # probability: from it on a test separates two effects; chosen
     rate: float = 1000.0  # Hz: sampling rate; that of `synthesize`
     noise: float = 0.005  # share of a channel's range, standard deviation; that of `synthesize`
     # share, standard deviation: error of a channel's gain; typical errors of gains are 1 to 5 %
@@ -118,7 +118,7 @@ class Planning:
     rounds: int = 8  # rounds of a rival's fit to another effect's traces; chosen
     starts: int = 2  # places at which a rival's fit begins; chosen
     # noncentrality beyond which a pair is told apart whatever a better fit leaves: 0.5 erfc(sqrt(400/8)) = 3e-23
-    beyond_doubt: float = 400.0
+    certain_noncentrality: float = 400.0
     # ratio to the noncentrality that is just detectable, at which effects are held against each other: twice as strong
     clearly: float = 4.0
     approaches: int = 12  # steps towards the least strength that shows; a step is exact where the response is linear

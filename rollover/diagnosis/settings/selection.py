@@ -173,7 +173,7 @@ class Stepwise:
     # ratio to the second effect's gain: with more left beyond the noise no third is searched, which would have come
     # first; chosen
     no_third_above: float = 3.0
-    # recordings on another course that are forgiven although a candidate scores beyond chance, one fewer; chosen
+    # diverged recordings that are weighted down although a candidate scores beyond chance, one fewer; chosen
     most_diverged: int = 2
     # share of the first excess misfit that two effects leave: above it no exchange of one helps; chosen
     hopeless_share: float = 0.7

@@ -16,7 +16,7 @@ from rollover.kernels import tables as c
 from rollover.kernels.tables import Tables
 from rollover.spec.excitation import Blows, Harmonic
 
-COUNTED = (1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000)  # turns after which the settlement is told
+COUNTED = (1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000)  # turns after which the settlement is reported
 LAST = 10  # turns at the end over which the steady motion is measured
 
 

@@ -45,7 +45,7 @@ def _by_rate(random: Random) -> Change:
     return _yields(dict.fromkeys(MOUNTS, 0.5 * whole), parameters, "by-rate", "Cowper, Symonds 1957", rate_factor=rate)
 
 
-def _one_by_one(random: Random) -> Change:
+def _mounts_in_turn(random: Random) -> Change:
     """One mount yields early, the other late: both together have a knee of two bends."""
     whole, apart = _whole(random), float(random.uniform(0.2, 0.5))
     first, second = random.permutation(MOUNTS).tolist()
@@ -54,7 +54,7 @@ def _one_by_one(random: Random) -> Change:
     return _yields(forces, {"yield_force": whole, "apart": apart}, "one-by-one", source)
 
 
-FORMS = {"rops-plasticity": (_hardening, _by_rate, _one_by_one)}
+FORMS = {"rops-plasticity": (_hardening, _by_rate, _mounts_in_turn)}
 
 
 def _drawn(id: str) -> Draw:

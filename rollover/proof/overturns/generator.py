@@ -43,7 +43,7 @@ LEAD = 0.06  # s more of the run behind the record, that the filter sees
 STEP, SPECTRAL_RADIUS = 2.5e-4, 0.85
 SPACING, POINTS = (0.035, 0.035), 0.016  # m, of elements and of contact points
 SHIFTED = 0.02  # m, by which the grid lies elsewhere, at most
-NEIGHBOURS = 2  # of each test, that scatter is told from
+PERTURBED_RUNS = 2  # of each test, that scatter is told from
 REFERENCES = 4  # overturns by another engine in which nothing is missing: as many as are diagnosed
 WINDOW = 0.02  # s, over which it is averaged
 NOTHING = {"over_noise": 0.0, "over_scatter": 0.0, "signal_to_noise": 0.0, "where": [], "channels": {}}
@@ -150,7 +150,7 @@ def make(order: Order) -> Case:
     for id in order.ids:
         free = {c: span for c, span in spans.items() if c not in [one.channel for one in changes]}
         changes += (lab.effects[id](random, free),)
-    made = _told(lab, shots, plain, changes)
+    made = _measured(lab, shots, plain, changes)
     noise = {c: Noise(sigma=share * spans[c], cfc=CLASS) for c in lab.channels}
     recordings = tuple(
         _recorded(lab, k, shot, one, noise, random) for k, (shot, one) in enumerate(zip(shots, made, strict=True))
@@ -171,7 +171,7 @@ def make(order: Order) -> Case:
     rests = (
         [nothing]
         if len(changes) == 1
-        else [_told(lab, shots, plain, [o for o in changes if o is not c]) for c in changes]
+        else [_measured(lab, shots, plain, [o for o in changes if o is not c]) for c in changes]
     )
     return Case(
         name=order.name,
@@ -214,7 +214,7 @@ def _run(scenario: Scenario) -> Recording:
     return solved.recording
 
 
-def _told(
+def _measured(
     lab: Laboratory, shots: Sequence[Shot], plain: Sequence[Recording], changes: Sequence[Change]
 ) -> list[dict[str, Array]]:
     """What the instruments make of all tests with these changes; `plain` are the overturns without any."""
@@ -230,11 +230,11 @@ def _scatter(
     found = []
     for shot, one in zip(shots, nothing, strict=True):
         squares = dict.fromkeys(lab.channels, np.zeros(_stamps(shot).size))
-        for _ in range(NEIGHBOURS):
+        for _ in range(PERTURBED_RUNS):
             x, y = random.uniform(-SHIFTED, SHIFTED, 2)
             there = replace(shot, shifted=(float(x), float(y)))
             other = _read(lab, there, _solved(lab, there, ()), ())
-            squares = {c: squares[c] + (other[c] - one[c]) ** 2 / NEIGHBOURS for c in lab.channels}
+            squares = {c: squares[c] + (other[c] - one[c]) ** 2 / PERTURBED_RUNS for c in lab.channels}
         window = np.ones(round(WINDOW * RATE)) / round(WINDOW * RATE)
         found.append({c: np.sqrt(np.convolve(squares[c], window, mode="same")) for c in lab.channels})
     return found

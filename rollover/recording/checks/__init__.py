@@ -12,8 +12,8 @@ from rollover.recording.attitude import continuous, means_over_wraps, on_other_b
 from rollover.recording.checks.angles import is_of_means, wraps
 from rollover.recording.checks.finding import Finding, Trace, instant, trace, when
 from rollover.recording.checks.frozen import frozen
+from rollover.recording.checks.jumps import jumps
 from rollover.recording.checks.kinematic import disagreements
-from rollover.recording.checks.leaps import leaps
 from rollover.recording.checks.levels import free_fall, rest
 from rollover.recording.checks.offsets import VEHICLE, polarity, zero_offsets
 from rollover.recording.checks.rails import rails, shared
@@ -74,7 +74,7 @@ def prechecks(
             *frozen(t, unit),
             *(g for g in gaps(t) if not is_of_means(g, read, means)),
             *spikes(t, unit, among_contacts=is_vehicle and not name.endswith(MOVING)),
-            *leaps(t, unit, recording.cfc.get(name)),
+            *jumps(t, unit, recording.cfc.get(name)),
         ]
     found += _stated(recording, traces)
     late = {f.channel for f in found if f.check == "gap"}

@@ -33,8 +33,8 @@ def frozen(t: Trace, unit: str) -> Iterator[Finding]:
         return
     floor = noise_floor(others)
     level = float(t.values[start])
-    leap = abs(float(t.values[start - 1]) - level)
-    if level == 0.0 and (unit in FLOOR or leap < FAR * floor.sigma):
+    jump = abs(float(t.values[start - 1]) - level)
+    if level == 0.0 and (unit in FLOOR or jump < FAR * floor.sigma):
         return
     if floor.sigma == 0.0:
         return

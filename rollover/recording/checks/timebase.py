@@ -68,19 +68,21 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
     places: dict[int, tuple[float, float, float]] = {}
     fits = {side: _across(t, side) for side in SIDES if t.values.size >= 4 * side}
     for side in reversed(fits):  # the longest first, which tells best how many
-        leap, way, bend, error, slope = fits[side]
+        jump, way, bend, error, slope = fits[side]
         if (shorter := fits.get(side // 2)) is not None:
             # where the error hides a sample's way, a whole number of samples says nothing for a jump
-            bend = bend + np.where(error * SAMPLES < np.abs(way), 0.0, _bends(leap, error, shorter[0], shorter[3]))
-        number = leap / np.where(way == 0.0, np.inf, way)
+            bend = bend + np.where(error * SAMPLES < np.abs(way), 0.0, _bends(jump, error, shorter[0], shorter[3]))
+        number = jump / np.where(way == 0.0, np.inf, way)
         whole = np.round(number)
-        doubt = np.hypot(error, whole * slope) / np.maximum(np.abs(way), 1e-300)
-        sure = np.abs(leap) > beyond * error + bend
-        sure &= (whole >= 1.0) & (np.abs(number - whole) < WHOLE + 3.0 * doubt) & (np.abs(way) > beyond * slope)
+        relative_error = np.hypot(error, whole * slope) / np.maximum(np.abs(way), 1e-300)
+        sure = np.abs(jump) > beyond * error + bend
+        sure &= (
+            (whole >= 1.0) & (np.abs(number - whole) < WHOLE + 3.0 * relative_error) & (np.abs(way) > beyond * slope)
+        )
         for k in map(int, np.flatnonzero(sure)):
-            near = np.abs(leap[max(0, k - side) : k + side + 1])
-            if abs(leap[k]) >= near.max():
-                places.setdefault(k, (float(whole[k]), float(abs(leap[k])) / error, float(doubt[k])))
+            near = np.abs(jump[max(0, k - side) : k + side + 1])
+            if abs(jump[k]) >= near.max():
+                places.setdefault(k, (float(whole[k]), float(abs(jump[k])) / error, float(relative_error[k])))
     kept: list[int] = []
     for k in sorted(places, key=lambda k: -places[k][1]):
         if all(abs(k - other) > SIDES[-1] for other in kept):
@@ -104,13 +106,13 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
     )
 
 
-def _bends(leap: Array, error: float, half: Array, wide: float) -> Array:
+def _bends(jump: Array, error: float, half: Array, wide: float) -> Array:
     """Infinite where a parabola through half as many samples says another jump: a bend among them feigns it, (n - 1,).
 
     The difference of nested fits has the shorter's variance less the longer one's; two deviations of it are let pass:
     1 of 20 true jumps is left to another length.
     """
-    return np.where(np.abs(half - leap) < 2.0 * math.sqrt(wide * wide - error * error), 0.0, np.inf)
+    return np.where(np.abs(half - jump) < 2.0 * math.sqrt(wide * wide - error * error), 0.0, np.inf)
 
 
 def _across(t: Trace, side: int) -> tuple[Array, Array, Array, float, float]:
@@ -120,10 +122,10 @@ def _across(t: Trace, side: int) -> tuple[Array, Array, Array, float, float]:
     V = np.vander(s, 3, increasing=True)
     W = np.linalg.pinv(V)
     windows = np.lib.stride_tricks.sliding_window_view(t.values, side)
-    leap, way, bend = np.zeros(n - 1), np.zeros(n - 1), np.full(n - 1, np.inf)
+    jump, way, bend = np.zeros(n - 1), np.zeros(n - 1), np.full(n - 1, np.inf)
     k = np.arange(side - 1, n - side)  # side samples up to k, side from k + 1 on
     before, after = windows[k - side + 1][:, ::-1] @ W.T, windows[k + 1] @ W.T
-    leap[k] = after[:, 0] - before[:, 0]
+    jump[k] = after[:, 0] - before[:, 0]
     way[k] = 0.5 * (after[:, 1] - before[:, 1])
     misfit_before = np.abs(windows[k - side + 1][:, ::-1] - before @ V.T).max(axis=1)
     misfit_after = np.abs(windows[k + 1] - after @ V.T).max(axis=1)
@@ -134,4 +136,4 @@ def _across(t: Trace, side: int) -> tuple[Array, Array, Array, float, float]:
     bend[k] += np.where(turns > STEADY * np.abs(way[k]) + 0.5 * (turns - excess), np.inf, 0.5 * excess)
     sigma = t.floor.sigma * float(np.sqrt(t.floor.independence))
     error, slope = sigma * np.sqrt(2.0) * np.linalg.norm(W[0]), sigma * np.sqrt(0.5) * np.linalg.norm(W[1])
-    return leap, way, bend, float(error), float(slope)
+    return jump, way, bend, float(error), float(slope)

@@ -79,7 +79,7 @@ def apart(read: Callable[..., V], path: Path, *more: Any, what: str, modules: Se
         if outcome.failure is not None:  # the next child has none of them
             _ready.clear()
     if outcome.failure is not None:
-        raise InputError(Fault(file=str(path), message=_told(outcome.failure, what, task, wall)))
+        raise InputError(Fault(file=str(path), message=_message(outcome.failure, what, task, wall)))
     if isinstance(outcome.value, InputError):
         raise outcome.value
     return outcome.value  # type: ignore[return-value]
@@ -109,7 +109,7 @@ def _work(task: _Task) -> Any:
         return unreadable(task.path, f"{task.what} file", e, CURE)
 
 
-def _told(failure: Failure, what: str, task: _Task, wall: float) -> str:
+def _message(failure: Failure, what: str, task: _Task, wall: float) -> str:
     again = budget.cure(2.0)
     if failure.kind == "memory-limit":
         return f"not read: the reader of {what} needs more than {budget.amount(task.memory)} of memory for it; {again}"

@@ -26,7 +26,7 @@ from rollover.recording.importers.date_times import (
 from rollover.recording.importers.importer import Importer
 from rollover.recording.importers.sidecar import DATE_TIME, Column, Csv, Described, Profile
 from rollover.recording.importers.signals import Signal, assemble
-from rollover.recording.importers.soundness import RATE_INSTEAD
+from rollover.recording.importers.soundness import RATE_CURE
 from rollover.recording.tables import blank_lines, csv_heading, first_rows, is_number, line_of_row, read_columns
 from rollover.recording.text_rows import Dialect, lines_of
 from rollover.spec import units
@@ -152,10 +152,10 @@ def in_brackets(name: str) -> str:
     brackets, or nothing.
     """
     own = re.sub(r"\s*\(column \d+\)$", "", name)
-    told = [*reversed(re.findall(r"[\[({]([^\[\](){}]*)[\])}]", own)), *re.findall(r"(?:.*/| in )([^/ ]+)$", own)]
+    bracketed = [*reversed(re.findall(r"[\[({]([^\[\](){}]*)[\])}]", own)), *re.findall(r"(?:.*/| in )([^/ ]+)$", own)]
     match = re.fullmatch(r"[^\[(]*[\[(](.*)[\])]", own)
-    told = [match[1], *told] if match else told
-    known = (unit for unit in told if any(units.find(unit, table, {}) is not None for table in UNITS.values()))
+    bracketed = [match[1], *bracketed] if match else bracketed
+    known = (unit for unit in bracketed if any(units.find(unit, table, {}) is not None for table in UNITS.values()))
     return next(known, match[1] if match else "")
 
 
@@ -197,7 +197,7 @@ def _seconds(path: Path, name: str, column: Column, words: Words, dialect: Diale
     for i in range(1, len(ns)):
         if ns[i] <= ns[i - 1]:
             before, after = (" ".join(map(str, rows[k])) for k in (i - 1, i))
-            what, cure = ("repeated stamp", RATE_INSTEAD) if ns[i] == ns[i - 1] else ("runs backwards", "")
+            what, cure = ("repeated stamp", RATE_CURE) if ns[i] == ns[i - 1] else ("runs backwards", "")
             raise refused(i, f"{what}, got {after!r} after {before!r}; it must increase{cure}")
     if not dated and abs(ns[0]) < EXACT and abs(ns[-1]) < EXACT:
         return np.array(ns, dtype=np.int64) / SECOND, ""

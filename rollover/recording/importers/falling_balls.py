@@ -31,7 +31,7 @@ BOOK, TABLE, SIZES = "Ball_drops_data.xls", "ball_drops.csv", "balls.txt"
 AREA = 0.01  # m2, to which the drag of every ball is referred, so that one coefficient holds for several
 RULES = {"volleyball": (0.27, 2.0 * math.pi * 0.105)}  # kg, m: by the rules of the game, 0.26 to 0.28 kg
 MASS_BY_RULES = 0.006  # kg, 1 sigma of what the rules allow
-TOLD = 80.0  # m: from there no ball lands within its record, not even one that falls without air
+RELEASE_HEIGHT = 80.0  # m: from there no ball lands within its record, not even one that falls without air
 HEIGHT, SPEED, WITHIN = 0.3, 0.3, 0.1  # m, m/s, s: 1 sigma of a ball that is let go by hand
 
 
@@ -96,12 +96,12 @@ def _recording(
     check_time(file, time)
     check_values(file, f"{name}, height", height)
     falling = landed(height)
-    conditions: dict[str, Any] = {"initiation.kind": "release", "initiation.height": TOLD}
+    conditions: dict[str, Any] = {"initiation.kind": "release", "initiation.height": RELEASE_HEIGHT}
     uncertainty: dict[str, Any] = {"initiation.height": HEIGHT, "initiation.speed": SPEED}
     notes = [
         "height from video at 15 Hz",
-        f"the zero of the heights is not the ground: shifted by {TOLD - height[0]:+.3f} m, so that the first row is at"
-        f" {TOLD:g} m, from where a ball without air does not land within the record either",
+        f"the zero of the heights is not the ground: shifted by {RELEASE_HEIGHT - height[0]:+.3f} m, so that the first"
+        f" row is at {RELEASE_HEIGHT:g} m, from where a ball without air does not land within the record either",
         f"let go by hand at about the first row, from about its height: {HEIGHT} m, {SPEED} m/s, {WITHIN} s in doubt",
         "the speed of the file is left out: a filtered difference of the height, not measured by itself",
     ]
@@ -133,7 +133,7 @@ def _recording(
         title=f"{ball}, drop {drop}",
         source=FALLING_BALLS.source,
         time=time[:falling],
-        channels={"striker/position_z": height[:falling] - height[0] + TOLD},
+        channels={"striker/position_z": height[:falling] - height[0] + RELEASE_HEIGHT},
         conditions=conditions,
         uncertainty=uncertainty,
         clock=Clock(zero="unknown", within=WITHIN),

@@ -23,7 +23,7 @@ from rollover.recording.importers import mme_codes as codes
 from rollover.recording.importers.data_status import judged
 from rollover.recording.importers.importer import Importer
 from rollover.recording.importers.mme_archive import content, names_in
-from rollover.recording.importers.mme_listing import promised, stray
+from rollover.recording.importers.mme_listing import promised, unlisted
 from rollover.recording.importers.mme_time import INTERVAL, contradiction, even_stamps, most_step
 from rollover.recording.importers.polarity import sign
 from rollover.recording.importers.sidecar import Described
@@ -113,7 +113,7 @@ def _recording(place: Path, path: Path, chosen: str, profile: Described | None) 
     head = _header(place, listing, content(place, listing))[0] if listing else {}
     held = [(channel.file, channel.code) for channel in channels]
     notes = (*found.notes, *promised(PurePosixPath(listing or chosen).name, {**test, **head}, held))
-    notes += tuple(stray(names_in(place))) if place.is_file() else ()
+    notes += tuple(unlisted(names_in(place))) if place.is_file() else ()
     flipped = {name: sign(name) * values for name, values in found.channels.items() if sign(name) < 0.0}
     return replace(found, title=title, source=source, channels={**found.channels, **flipped}, notes=notes)
 

@@ -43,7 +43,7 @@ def promised(name: str, head: Mapping[str, str], held: Sequence[tuple[str, str]]
     return notes
 
 
-def stray(names: Sequence[str]) -> list[str]:
+def unlisted(names: Sequence[str]) -> list[str]:
     """A note of the files of an archive that stand neither beside the file of a test nor in its folder of channels."""
     homes = {PurePosixPath(name).parent for name in names if name.lower().endswith(".mme")}
     left = []

@@ -86,7 +86,7 @@ def assemble(
         }
     for name, column in by.columns.items():
         if name not in signals:
-            raise by.refuse(name, f"no such column in {path.name}, got {name!r}; {_instead(name, signals)}")
+            raise by.refuse(name, f"no such column in {path.name}, got {name!r}; {_cure(name, signals)}")
         if signals[name].left_out:
             raise by.refuse(name, f"not a column of numbers over time: {signals[name].left_out}; another column")
         if signals[name].unreadable:
@@ -302,7 +302,7 @@ def _held(signals: Mapping[str, Signal]) -> list[str]:
     return [f"{name} ({reason})" if reason else name for name, reason in reasons.items()]
 
 
-def _instead(name: str, signals: Mapping[str, Signal]) -> str:
+def _cure(name: str, signals: Mapping[str, Signal]) -> str:
     """What to write instead of a name that the file does not hold: the nearest, and what there is."""
     parts = [n for n in signals if n.startswith((f"{name}[", f"{name}.", f"{name} ("))]
     if parts:

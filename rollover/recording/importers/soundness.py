@@ -15,7 +15,7 @@ from rollover.system.errors import Fault, InputError
 P = ParamSpec("P")
 
 Array = NDArray[np.float64]
-RATE_INSTEAD = "; a clock too coarse for its samples: `rate` in Hz in a profile, and no column of time"
+RATE_CURE = "; a clock too coarse for its samples: `rate` in Hz in a profile, and no column of time"
 Line = Callable[[int], int | None]  # row of a channel -> line of the file, for messages
 
 
@@ -56,7 +56,7 @@ def check_time(path: Path, time: Array, line: Line = lambda row: None, other: st
     if wrong.size:
         row = int(wrong[0]) + 1
         what = "repeated stamp" if time[row] == time[row - 1] else "runs backwards"
-        cure = RATE_INSTEAD if time[row] == time[row - 1] else ""
+        cure = RATE_CURE if time[row] == time[row - 1] else ""
         if other:
             cure = f", or a profile takes other stamps: {{{other!r}: {{channel: time}}}}"
         got = f"got {float(time[row])!r} after {float(time[row - 1])!r}"

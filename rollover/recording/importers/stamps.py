@@ -77,6 +77,6 @@ def clock_digits(values: NDArray[Any]) -> tuple[float, float] | None:
         return None
     at = np.flatnonzero(np.diff(np.floor(values / 100.0)))
     step = float(np.median(np.diff(values)))
-    leaps = np.diff(values)[at] - np.where(np.diff(np.floor(values / 10_000.0))[at] > 0.0, 4040.0, 40.0)
-    is_one = bool(at.size) and bool(np.all(np.abs(leaps - step) < 0.5 * step))
+    jumps = np.diff(values)[at] - np.where(np.diff(np.floor(values / 10_000.0))[at] > 0.0, 4040.0, 40.0)
+    is_one = bool(at.size) and bool(np.all(np.abs(jumps - step) < 0.5 * step))
     return (float(values[at[0]]), float(values[at[0] + 1])) if is_one else None

@@ -80,9 +80,9 @@ def _beside_scale(found: Signal, channel: Any, levels: Sequence[Properties]) -> 
 
     The property is its own, its group's or the file's.
     """
-    told = (cf.stated_scale({k: v for k, v in level.items() if not k.startswith(("NI_", "wf_"))}) for level in levels)
+    scales = (cf.stated_scale({k: v for k, v in level.items() if not k.startswith(("NI_", "wf_"))}) for level in levels)
     said = next(
-        (f"{one}{whose}" for one, whose in zip(told, ("", " of its group", " of the file"), strict=True) if one), ""
+        (f"{one}{whose}" for one, whose in zip(scales, ("", " of its group", " of the file"), strict=True) if one), ""
     )
     is_scaled = any(key.endswith("]_Scale_Type") for key in channel.properties)
     is_clock = found.began is not None and found.time is None

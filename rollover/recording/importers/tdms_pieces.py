@@ -76,8 +76,8 @@ def continued(
     own = time.copy()
     for at, began in starts:
         own[at:] = time[0] + (began - starts[0][1]) / 1e9 + step * np.arange(time.size - at)
-    leaps = np.array([own[at] - time[at] for at, _ in starts])
-    if np.all(np.abs(leaps) <= ON_TIME * step):
+    jumps = np.array([own[at] - time[at] for at, _ in starts])
+    if np.all(np.abs(jumps) <= ON_TIME * step):
         return time, ""
     if np.any(np.diff(own) <= 0.0):
         raise ValueError(f"its {len(starts)} pieces overlap in time by their {START}; pieces one after the other")

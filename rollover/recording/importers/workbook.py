@@ -144,9 +144,9 @@ def _filled(sheet: Any, claimed: Budget, texts: Any = None) -> Iterator[Row]:
     """
     empty = 0  # programs write 65536 of them at the end
     formulas = repeat(()) if texts is None else texts.iter_rows(values_only=True)
-    for row, told in zip(sheet.iter_rows(values_only=True), formulas, strict=False):
-        if told and None in row:
-            row = tuple(map(_without_value, row, told))
+    for row, formula_row in zip(sheet.iter_rows(values_only=True), formulas, strict=False):
+        if formula_row and None in row:
+            row = tuple(map(_without_value, row, formula_row))
         claimed.claim(PLACE * len(row), f"sheet {sheet.title}")
         if all(value is None for value in row):
             empty += 1

@@ -1,4 +1,4 @@
-"""The doors of results, which are made once by the commands themselves, of the command line, and the list of all."""
+"""The entry points of results, made once by the commands themselves, of the command line, and all of them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pathlib import Path
 from rollover.cli.commands.exporting import FORMATS
 from tests.fuzz import seeds
 from tests.fuzz.answers import answers, own_code, signals
-from tests.fuzz.doors import OUT, Door, Seed, documents, recordings
+from tests.fuzz.entry_points import OUT, EntryPoint, Seed, documents, recordings
 from tests.fuzz.oracle import command
 from tests.fuzz.seeds import Files
 
 
-def results(folder: Path) -> list[Door]:
+def results(folder: Path) -> list[EntryPoint]:
     """Results folders, made once in `folder` by the commands themselves."""
     here = Path.cwd()
     os.chdir(folder)
@@ -167,17 +167,17 @@ def results(folder: Path) -> list[Door]:
         ),
     ]
     return [
-        Door(name="answers to sealed cases", seeds=entries, weight=0.6),
-        Door(name="results", seeds=runs, weight=1.5),
-        Door(name="export", seeds=exported, weight=0.8),
-        Door(name="view", seeds=view, weight=0.02),
-        Door(name="study results", seeds=study, weight=0.1),
-        Door(name="diagnosis", seeds=diagnosis, weight=0.12),
-        Door(name="account", seeds=report, weight=0.03),
+        EntryPoint(name="answers to sealed cases", seeds=entries, weight=0.6),
+        EntryPoint(name="results", seeds=runs, weight=1.5),
+        EntryPoint(name="export", seeds=exported, weight=0.8),
+        EntryPoint(name="view", seeds=view, weight=0.02),
+        EntryPoint(name="study results", seeds=study, weight=0.1),
+        EntryPoint(name="diagnosis", seeds=diagnosis, weight=0.12),
+        EntryPoint(name="account", seeds=report, weight=0.03),
     ]
 
 
-def options() -> list[Door]:
+def options() -> list[EntryPoint]:
     """Words of the command line."""
     rec = {"drop_1.csv": seeds.csv(seeds.drop_columns()), "drop_1.yaml": seeds.SIDE.encode()}
     run = ["run", "drop_test", "--no-half-step", *OUT, "--set", "initiation.speed=2.0"]
@@ -239,9 +239,9 @@ def options() -> list[Door]:
         Seed(name=" ".join(words[:1]) + f" {words[vary[0] - 1]}", files=rec, words=words, vary=vary, weight=weight)
         for words, vary, weight in lines
     ]
-    return [Door(name="command line", seeds=made, weight=1.5)]
+    return [EntryPoint(name="command line", seeds=made, weight=1.5)]
 
 
-def doors(folder: Path) -> list[Door]:
-    """All doors; results are made in `folder`."""
+def entry_points(folder: Path) -> list[EntryPoint]:
+    """All entry points; results are made in `folder`."""
     return [*documents(), *recordings(), *results(folder), *options(), signals(), own_code(), answers()]

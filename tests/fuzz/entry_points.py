@@ -1,4 +1,4 @@
-"""Every door of the program, each with valid inputs, what of them may be changed, and the command that reads them."""
+"""Every entry point of the program: valid inputs, what of them may be changed, the command that reads them."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class Seed:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Door:
-    """One door: its seeds, and its share of all inputs."""
+class EntryPoint:
+    """One entry point: its seeds, and its share of all inputs."""
 
     name: str
     seeds: list[Seed] = field(default_factory=list)
@@ -82,7 +82,7 @@ def _odd_word(word: str, rng: Rng) -> str:
 OUT = ("--out", "out")
 
 
-def documents() -> list[Door]:
+def documents() -> list[EntryPoint]:
     """Scenarios, vehicles, ROPS, soils, studies, baselines."""
     root = seeds.shipped_folder()
     shipped = ("drop_test", "side_overturn", "cube_toss", "kerb_trip", "tilt_table", "pendulum", "static_rops_test")
@@ -170,18 +170,18 @@ def documents() -> list[Door]:
         ),
     ]
     return [
-        Door(name="scenario", seeds=scenario, weight=3.0),
-        Door(name="vehicle, ROPS, soil", seeds=vehicles, weight=2.0),
-        Door(name="study", seeds=studies, weight=1.5),
-        Door(name="baseline", seeds=baselines, weight=1.0),
+        EntryPoint(name="scenario", seeds=scenario, weight=3.0),
+        EntryPoint(name="vehicle, ROPS, soil", seeds=vehicles, weight=2.0),
+        EntryPoint(name="study", seeds=studies, weight=1.5),
+        EntryPoint(name="baseline", seeds=baselines, weight=1.0),
     ]
 
 
 TO = (("--to", "parquet"), ("--to", "mme.zip"), ("--channel", "?*"), ("--select", "?*"), ("--as", "?csv"))
 
 
-def recordings() -> list[Door]:
-    """Our own recordings, profiles, and one door for each importer and each published set of the tables."""
+def recordings() -> list[EntryPoint]:
+    """Our own recordings, profiles, and one entry point for each importer and each published set of the tables."""
     from rollover.recording.importers import COLLECTIONS, importers
 
     own = {"drop_1.csv": seeds.csv(seeds.drop_columns()), "drop_1.yaml": seeds.SIDE.encode()}
@@ -204,7 +204,10 @@ def recordings() -> list[Door]:
         Seed(name="profile", files=raw, words=profile, options=TO),
         Seed(name="conditions by name", files=by_name, words=profile, touched=("p.yaml",)),
     ]
-    doors = [Door(name="recording", seeds=plain, weight=2.0), Door(name="profile", seeds=profiles, weight=1.5)]
+    entry_points = [
+        EntryPoint(name="recording", seeds=plain, weight=2.0),
+        EntryPoint(name="profile", seeds=profiles, weight=1.5),
+    ]
     makers: dict[str, tuple[str, Callable[..., bytes]]] = {
         "mat": ("a.mat", seeds.mat),
         "tdms": ("a.tdms", seeds.tdms),
@@ -263,9 +266,9 @@ def recordings() -> list[Door]:
                     touched=(file, file, "p.yaml"),
                 ),
             ]
-            doors.append(Door(name=f"importer {name}", seeds=found))
-        elif name not in ("plain", "csv"):  # which the first two doors are
-            doors.append(Door(name=f"importer {name}", seeds=of_text[name]))
+            entry_points.append(EntryPoint(name=f"importer {name}", seeds=found))
+        elif name not in ("plain", "csv"):  # which the first two are
+            entry_points.append(EntryPoint(name=f"importer {name}", seeds=of_text[name]))
     made: dict[str, Callable[..., Files]] = {
         "cube-tosses": sets.cube,
         "elbow-tosses": sets.elbow,
@@ -277,8 +280,8 @@ def recordings() -> list[Door]:
     for name in COLLECTIONS:
         make_set = made[name]
         slow = name in ("soil-penetrometer",)
-        doors.append(
-            Door(
+        entry_points.append(
+            EntryPoint(
                 name=f"set {name}",
                 seeds=[
                     Seed(
@@ -291,4 +294,4 @@ def recordings() -> list[Door]:
                 weight=0.1 if slow else 0.6,
             )
         )
-    return doors
+    return entry_points

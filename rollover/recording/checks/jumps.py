@@ -21,26 +21,26 @@ Array = NDArray[np.float64]
 REACH = 3  # samples to either side
 ONE = np.eye(1, 4 * REACH + 1, 2 * REACH)[0]  # a sample among those that it touches
 PHASES = 8  # at which an impact may fall between two samples
-SURELY = 1.5  # times what an impact of no duration leaves
+MARGIN = 1.5  # times what an impact of no duration leaves
 TELLING = 0.3  # of a jump: not told where impacts lie nearly as far off
 NOISY = 4.0  # standard deviations of the noise of such a difference
 BACK = 0.5  # of a jump, that comes back at the next sample: a spike
 DIGITS = 1.5  # steps of a digitised channel
-LASTING = 2.0  # periods of the filter's -3 dB frequency within which it is done with an impact
+DECAY = 2.0  # periods of the filter's -3 dB frequency within which it is done with an impact
 AGAIN = 2  # jumps, at least: one alone is a disturbance
 
 
-def leaping(t: Trace, cfc: int | None) -> NDArray[np.int64]:
+def jumping(t: Trace, cfc: int | None) -> NDArray[np.int64]:
     """Samples before which a channel jumps as its filter class `cfc` lets none; none where that cannot be told."""
     rate = 1.0 / t.step
     if cfc is None or not t.regular or t.values.size < 8 * REACH or rate < least_rate(cfc):
         return np.zeros(0, dtype=np.int64)
-    most = SURELY * of_a_blow(round(rate, 3), cfc)
+    most = MARGIN * of_an_impact(round(rate, 3), cfc)
     if most > TELLING:
         return np.zeros(0, dtype=np.int64)
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-    width = 2 * max(REACH, round(LASTING * 0.6 / cfc / t.step)) + 1
+    width = 2 * max(REACH, round(DECAY * 0.6 / cfc / t.step)) + 1
     about = maximum_filter1d(t.values, width) - minimum_filter1d(t.values, width)
     steps = np.abs(np.diff(t.values))
     digit = float(np.min(steps[steps > 0.0], initial=np.inf))
@@ -58,9 +58,9 @@ def leaping(t: Trace, cfc: int | None) -> NDArray[np.int64]:
     return most_off[again < BACK * off[most_off]]
 
 
-def leaps(t: Trace, unit: str, cfc: int | None) -> Iterator[Finding]:
+def jumps(t: Trace, unit: str, cfc: int | None) -> Iterator[Finding]:
     """Jumps that the filter class of a channel lets no signal make, if there are several."""
-    found = leaping(t, cfc)
+    found = jumping(t, cfc)
     if found.size < AGAIN:
         return
     off = across(t.values)[found]
@@ -85,10 +85,10 @@ def across(values: Array) -> Array:
 
 
 @functools.lru_cache(maxsize=64)
-def of_a_blow(rate: float, cfc: int) -> float:
+def of_an_impact(rate: float, cfc: int) -> float:
     """How far an impact of no duration behind a filter class lies off cubics, over its height, at a rate (Hz)."""
     fine = 1.0 / (PHASES * rate)
-    blow = np.zeros(2 * PHASES * max(200, round(4.0 * rate * 0.6 / cfc)))
-    blow[blow.size // 2] = 1.0
-    behind = filtered(blow, fine, cfc)
+    impact = np.zeros(2 * PHASES * max(200, round(4.0 * rate * 0.6 / cfc)))
+    impact[impact.size // 2] = 1.0
+    behind = filtered(impact, fine, cfc)
     return max(float(across(behind[k::PHASES]).max()) for k in range(PHASES)) / float(np.ptp(behind))
