@@ -214,7 +214,7 @@ def unfit(scenario: Scenario) -> str:
     return ""
 
 
-@lru_cache(maxsize=TOLD)
+@lru_cache(maxsize=CACHED_GROUNDS)
 def _is_level(surface: Itself) -> bool:
     return is_flat(surface.thing) and not any(gradient(surface.thing))
 
