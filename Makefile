@@ -17,7 +17,9 @@ demo: setup
 	@echo "Look at it with: .venv/bin/rollover view out/demo"
 
 # what takes one core goes side by side; worksteal keeps a module's tests, and what they share, with one worker
+# and tests start the program some hundred times, which compiles every source anew where the environment writes no bytecode
 test: $(TESTED)
+	@.venv/bin/python -m compileall -q -j 0 ground rollover viz tests
 	@$(MAKE) --no-print-directory -j lint test-core
 	.venv/bin/pytest -n auto --dist worksteal --strict-skips tests
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -261,6 +262,16 @@ class Scenario:
         if isinstance(self.initiation, Driving) and isinstance(self.vehicle, Vehicle):
             return wheel_estimates(self.vehicle)
         return ()
+
+    def under(self, changes: Mapping[str, Any]) -> Scenario:
+        """Return this scenario with values of its effects exchanged, ``{"effects.mass.added": 3.0}``, for fits.
+
+        Effects keep to their own bounds; what does not hang on them is not checked again. Raises as
+        `document.exchanged` does.
+        """
+        found = copy(self)
+        object.__setattr__(found, "effects", document.exchanged_below(self, "effects", changes))
+        return found
 
     def applied(self) -> Scenario:
         """Return this scenario with the values that its effects replace; the effects stay, for their other terms."""

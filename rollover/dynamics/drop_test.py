@@ -209,10 +209,14 @@ def unfit(scenario: Scenario) -> str:
     if scenario.inputs:
         return f"inputs: prescribed over time, got {scenario.inputs[0].name!r}; a drop test by itself has none"
     slope = scenario.effects.get("slope")
-    surface = scenario.ground.surface
-    if not is_flat(surface) or any(gradient(surface)) or (slope is not None and slope.angle != 0.0):
+    if not _is_level(Itself(scenario.ground.surface)) or (slope is not None and slope.angle != 0.0):
         return "ground.surface: not level throughout; a drop test by itself needs level ground"
     return ""
+
+
+@lru_cache(maxsize=CACHED_GROUNDS)
+def _is_level(surface: Itself) -> bool:
+    return is_flat(surface.thing) and not any(gradient(surface.thing))
 
 
 def simulate_drop(scenario: Scenario, times: Array | None = None) -> Recording:

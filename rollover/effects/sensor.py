@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -51,7 +50,7 @@ def is_length(channel: str) -> bool:
 
 
 def _with(recording: Recording, channel: str, values: Array) -> Recording:
-    return replace(recording, channels={**recording.channels, channel: values})
+    return recording.showing({**recording.channels, channel: values})
 
 
 @compiled

@@ -7,6 +7,7 @@ the two-pass -3 dB point at CFC/0.6 Hz.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from ground.compiled import leaf
 from rollover.recording.record import CFC, CLASSES
 
-__all__ = ["CFC", "CLASSES", "ISO_6487", "J211", "filtered", "least_rate"]
+__all__ = ["CFC", "CLASSES", "ISO_6487", "J211", "LowPass", "filtered", "least_rate", "low_pass"]
 
 J211, ISO_6487 = 2.0775, 1.25 / 0.6
 
@@ -26,8 +27,16 @@ def least_rate(cfc: int) -> float:
     return 6.0 * cfc / 0.6
 
 
-def filtered(values: NDArray[np.float64], step: float, cfc: int, *, constant: float = J211) -> NDArray[np.float64]:
-    """Values (n,) sampled every `step` s through a filter class; ends are continued by odd reflection.
+@dataclass(frozen=True, kw_only=True)
+class LowPass:
+    """A filter class at a sampling rate: b (3), a (3) and the steady state (2) in one, and by how much ends go on."""
+
+    coefficients: NDArray[np.float64]
+    pad: int
+
+
+def low_pass(cfc: int, step: float, *, constant: float = J211) -> LowPass:
+    """The filter of a class for values every `step` s.
 
     Raises ``ValueError`` for an unknown class, and where the rate is too low for the class.
     """
@@ -37,14 +46,22 @@ def filtered(values: NDArray[np.float64], step: float, cfc: int, *, constant: fl
         raise ValueError(
             f"cfc: sampled too slowly for CFC {cfc}, got {1.0 / step:.6g} Hz; at least {least_rate(cfc):.0f} Hz"
         )
+    return LowPass(coefficients=_coefficients(cfc * constant, step), pad=max(round(0.01 / step), 100))
+
+
+def filtered(values: NDArray[np.float64], step: float, cfc: int, *, constant: float = J211) -> NDArray[np.float64]:
+    """Values (n,) sampled every `step` s through a filter class; ends are continued by odd reflection.
+
+    Raises ``ValueError`` as `low_pass` does.
+    """
+    found = low_pass(cfc, step, constant=constant)
     if values.size < 2:
         return np.array(values, dtype=float)
-    b, a, steady = _coefficients(cfc * constant, step)
-    pad = min(max(round(0.01 / step), 100), values.size - 1)
+    pad, own = min(found.pad, values.size - 1), found.coefficients
     smooth = np.empty(values.size + 2 * pad)
     # SciPy's filtfilt works the steady state out anew each time, and its lfilter looks at its arguments for longer than
     # a pass takes
-    run_through(b, a, steady, np.ascontiguousarray(values, dtype=np.float64), pad, smooth)
+    run_through(own[0:3], own[3:6], own[6:8], np.ascontiguousarray(values, dtype=np.float64), pad, smooth)
     return smooth[pad : pad + values.size].copy()
 
 
@@ -75,12 +92,12 @@ def run_through(b: Any, a: Any, steady: Any, values: Any, pad: int, smooth: Any)
 
 
 @lru_cache(maxsize=64)
-def _coefficients(frequency: float, step: float) -> tuple[NDArray[np.float64], ...]:
-    """Numerator, denominator, and the filter's state behind a constant 1."""
+def _coefficients(frequency: float, step: float) -> NDArray[np.float64]:
+    """Numerator, denominator, and the filter's state behind a constant 1, (8,)."""
     from scipy.signal import butter, lfilter_zi  # slow to import, and a scenario's check needs only the rates
 
     b, a = butter(2, frequency, fs=1.0 / step)
-    return b, a, lfilter_zi(b, a)
+    return np.concatenate([b, a, lfilter_zi(b, a)])
 
 
 def attenuation(frequency: float, step: float, cfc: int, *, constant: float = J211) -> float:

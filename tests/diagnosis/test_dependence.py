@@ -162,9 +162,9 @@ def test_a_deviating_channel_is_found_by_the_others_residuals() -> None:
     rng, curved, loose = np.random.default_rng(3), [], []
     for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
         x = r.channels[drops.FORCE]
-        curved = x * (1.0 + 0.3 * x / x.max())
+        distorted = x * (1.0 + 0.3 * x / x.max())
         gone = np.where(np.repeat(rng.random(x.size // 5 + 1) < 0.1, 5)[: x.size], 0.0, x)
-        curved.append((name, replace(r, channels={**r.channels, drops.FORCE: curved})))
+        curved.append((name, replace(r, channels={**r.channels, drops.FORCE: distorted})))
         loose.append((name, replace(r, channels={**r.channels, drops.FORCE: gone})))
     for made, on in ((curved, VALUE), (loose, TIME)):
         found = of_one(made)

@@ -22,7 +22,7 @@ from rollover.diagnosis.fit.linearisation import ResidualBlock, time_shift_step
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.fit.tasks import Task
 from rollover.diagnosis.forward.averaging import simulated
-from rollover.diagnosis.forward.discontinuities import largest_jump_nearby
+from rollover.diagnosis.forward.discontinuities import largest_jumps_nearby
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.restarts import _best_middle
 from rollover.diagnosis.settings import SETTINGS
@@ -72,8 +72,9 @@ def test_a_jump_is_masked_within_a_sample_and_not_beyond() -> None:
 
 def test_about_a_jump_lie_the_samples_that_it_may_fall_to() -> None:
     times = np.array([0.0, 1.0, 2.0, 3.0])
-    found = largest_jump_nearby(times, np.array([-0.5, 1.5, 1.7, 9.0]), np.array([5.0, -2.0, 3.0, 4.0]))
-    assert found.tolist() == [5.0, 3.0, 3.0, 4.0]
+    sizes = np.array([[0.0, 5.0], [1.0, -2.0], [0.0, 3.0], [0.0, 4.0]])
+    found = largest_jumps_nearby(times, np.array([-0.5, 1.5, 1.7, 9.0]), sizes, np.array([1, 0]))
+    assert found.tolist() == [[5.0, 3.0, 3.0, 4.0], [0.0, 1.0, 1.0, 0.0]]
 
 
 def test_a_second_contact_is_masked_at_any_time_shift() -> None:

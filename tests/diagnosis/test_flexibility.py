@@ -24,8 +24,8 @@ def curved(curvature: float, seed: int, noise: float, rate: float) -> list:  # t
     made = []
     for name, r in recorded({}, seed, speeds=SPEEDS, channels=CHANNELS, noise=noise, rate=rate):
         force = r.channels[FORCE]
-        curved = force + curvature * force**2 / np.max(force)
-        made.append((name, replace(r, channels={**r.channels, FORCE: curved})))
+        distorted = force + curvature * force**2 / np.max(force)
+        made.append((name, replace(r, channels={**r.channels, FORCE: distorted})))
     return made
 
 

@@ -113,3 +113,16 @@ def test_an_unhashable_value_is_exchanged_all_the_same() -> None:
         hash(Loose(3.0))
     for added in (3.0, 4.0):
         assert exchanged(load(DROP), {"effects.mass.added": Loose(added)}).effects["mass"].added == added
+
+
+def test_values_of_effects_alone_are_exchanged_the_same() -> None:
+    some = load(DROP)
+    twice = {**LAYER, "effects.mass.added": 1.0}
+    found = some.under(twice)
+    assert found == exchanged(some, twice)
+    assert some.effects == {}
+    assert exchanged(some, {"initiation.speed": 2.0}).under(twice).effects is found.effects
+    with pytest.raises(ValueError, match=r"depth: out of bounds, got -0\.05"):
+        some.under({"effects.soil-layer.depth": -0.05})
+    with pytest.raises(KeyError, match="no such path: depht in SoilLayer"):
+        some.under({"effects.soil-layer.depht": 0.05})

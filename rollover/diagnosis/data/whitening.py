@@ -42,33 +42,34 @@ class Whitening:
 
     def __call__(self, raw: Array) -> Array:
         """Stacked samples (n,), or columns of them (n, m), SI, whitened: as white noise of variance 1 where noise."""
-        if raw.ndim == 2:
-            return np.stack([self(column) for column in np.ascontiguousarray(raw.T)], axis=1)
-        out = np.empty(raw.size)
-        into(
-            np.ascontiguousarray(raw, dtype=np.float64), self.stops, self._sigma, self._sd, self._weight,
-            self._orders, self._ar, self._gains, out,
-        )  # fmt: skip
-        return out
+        # each column in one piece, as a single one is
+        columns = np.ascontiguousarray(np.atleast_2d(raw.T), dtype=np.float64)
+        out = np.empty(columns.shape)
+        into(columns, self.stops, self._sigma, self._sd, self._weight, self._orders, self._ar, self._gains, out)
+        return out[0] if raw.ndim == 1 else np.ascontiguousarray(out.T)
 
 
 @leaf
 def into(raw: Any, stops: Any, sigma: Any, sd: Any, weight: Any, orders: Any, ar: Any, gains: Any, out: Any) -> None:
-    """y_i = w g (x_i - sum_j a_j x_i-j), x = raw/sigma, or raw/loud where that is not 0, g of the autoregression."""
-    first = 0
-    for k in range(stops.size):
-        last, order = stops[k], orders[k]
-        for i in range(first, last):
-            out[i] = raw[i] / sigma[k]
-            if sd[i] != 0.0:
-                out[i] = out[i] * sigma[k] / sd[i]
-        if order > 0:
-            for i in range(last - 1, first + order - 1, -1):
-                for j in range(order):
-                    out[i] -= ar[k, j] * out[i - 1 - j]
-                out[i] *= gains[k]
-            for i in range(first, min(first + order, last)):
-                out[i] = 0.0  # no past to whiten with
-        for i in range(first, last):
-            out[i] *= weight[i]
-        first = last
+    """y_i = w g (x_i - sum_j a_j x_i-j), x = raw/sigma, or raw/loud where that is not 0, g of the autoregression.
+
+    `raw` and `out` are (m, n), a stack in each row.
+    """
+    for c in range(raw.shape[0]):
+        first = 0
+        for k in range(stops.size):
+            last, order = stops[k], orders[k]
+            for i in range(first, last):
+                out[c, i] = raw[c, i] / sigma[k]
+                if sd[i] != 0.0:
+                    out[c, i] = out[c, i] * sigma[k] / sd[i]
+            if order > 0:
+                for i in range(last - 1, first + order - 1, -1):
+                    for j in range(order):
+                        out[c, i] -= ar[k, j] * out[c, i - 1 - j]
+                    out[c, i] *= gains[k]
+                for i in range(first, min(first + order, last)):
+                    out[c, i] = 0.0  # no past to whiten with
+            for i in range(first, last):
+                out[c, i] *= weight[i]
+            first = last

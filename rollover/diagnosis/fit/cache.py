@@ -150,7 +150,7 @@ class Simulations:
         if found is None:
             return None
         y = self.dataset[r].raw(found)
-        return (y, found) if np.all(np.isfinite(y)) else None
+        return (y, found) if np.isfinite(y).all() else None
 
     @staticmethod
     def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:

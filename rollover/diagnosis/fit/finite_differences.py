@@ -157,7 +157,7 @@ def time_derivative(
         found = e.simulator.predict(changes, shift - later)
         slope = slope if found is None else (after - e.raw(found)) / (2.0 * later)
     slope[discontinuities] = 0.0
-    return np.nan_to_num(slope)
+    return slope if np.isfinite(slope).all() else np.nan_to_num(slope)
 
 
 def clock_aligned_difference(

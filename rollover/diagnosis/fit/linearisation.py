@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,12 +74,12 @@ class ResidualBlock:
         """Slope of the shift of samples that count in full."""
         return self.slope if self.heavy_tail is None else self.slope / self.heavy_tail.samples
 
-    @property
+    @cached_property
     def squares(self) -> float:
         """Sum of squares of what is left, another course for what it counts (D9)."""
         return float(self.residual @ self.residual) + (0.0 if self.heavy_tail is None else self.heavy_tail.more)
 
-    @property
+    @cached_property
     def weight(self) -> float:
         """s's + 1/sd^2."""
         return float(self.slope @ self.slope) + self.prior**-2
@@ -90,6 +91,10 @@ class ResidualBlock:
 
     def normal(self) -> tuple[Array, Array, float]:
         """A (p, p), b (p,), c: |..|^2 of (D1) with tau eliminated is c - 2 b'dx + dx'A dx."""
+        return self._normal
+
+    @cached_property
+    def _normal(self) -> tuple[Array, Array, float]:
         g = float(self.slope @ self.residual) - self.shift * self.prior**-2
         h = self.J.T @ self.slope
         A = self.J.T @ self.J - np.outer(h, h) / self.weight

@@ -269,10 +269,12 @@ def _early(problem: Problem, r: int, raws: Array, shifts: Array) -> Array:
         raw, times = raws[:, part], stamps - shifts[:, None] - e.simulator.contact
         sigma = np.hypot(s.sigma, TUNING.model_error * (raw - raw[:, :1]))
         each, worth = ((s.values - raw) / sigma) ** 2, _worth(s)
-        for k, time in enumerate(times):
-            after = time[time > 0.0][TUNING.early_samples - 1 : TUNING.early_samples]
-            inside = time < max([TUNING.early_window, *after])  # a record may end before
-            total[k] += worth * float(np.sum(each[k][inside]))
+        # stamps rise, so that what is early are the first of them; a record may end before
+        last = np.count_nonzero(times <= 0.0, axis=1) + TUNING.early_samples - 1
+        known = np.minimum(last, stamps.size - 1)[:, None]
+        end = np.where(last < stamps.size, np.take_along_axis(times, known, axis=1)[:, 0], -np.inf)
+        early = np.count_nonzero(times < np.maximum(end, TUNING.early_window)[:, None], axis=1)
+        total += worth * np.array([float(np.sum(row[:n])) for row, n in zip(each, early, strict=True)])
     return total
 
 

@@ -44,13 +44,17 @@ def near_discontinuity(y: Any, least: Any, first: Any, last: Any) -> Any:
 
 
 @compiled
-def largest_jump_nearby(times: Any, jumps: Any, sizes: Any) -> Any:
-    """How far jumps at instants (j,) of `sizes` (j,) go between each of `times` (n,) and those beside it, the most."""
-    found = np.zeros(times.size)
-    for k in range(jumps.size):
-        after = np.searchsorted(times, jumps[k])
+def largest_jumps_nearby(times: Any, jumps: Any, sizes: Any, columns: Any) -> Any:
+    """How far some `columns` (c,) jump between each of `times` (n,) and those beside it, the most, (c, n).
+
+    They do at instants (j,) by `sizes` (j, k).
+    """
+    found = np.zeros((columns.size, times.size))
+    for j in range(jumps.size):
+        after = np.searchsorted(times, jumps[j])
         for i in range(max(after - 1, 0), min(after + 1, times.size)):
-            found[i] = max(found[i], abs(sizes[k]))
+            for c in range(columns.size):
+                found[c, i] = max(found[c, i], abs(sizes[j, columns[c]]))
     return found
 
 

@@ -30,12 +30,17 @@ class Rows:
     even: NDArray[np.int64]
     step: float
 
+    @property
+    def are_stamps(self) -> bool:
+        """Whether all rows are even, and stamps."""
+        return self.even.size == self.stamps.size == self.times.size
+
     def behind(self, values: Array, cfc: int) -> Array:
         """A channel (m,) or several (m, k) behind a filter class, at the stamps."""
         if values.ndim == 2:
             return np.stack([self.behind(column, cfc) for column in values.T], axis=1)
         smooth = filtered(values[self.even], self.step, cfc)
-        if self.even.size == self.stamps.size == self.times.size:
+        if self.are_stamps:
             return smooth
         return np.interp(self.times[self.stamps], self.times[self.even], smooth)
 

@@ -10,12 +10,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, largest_jump_nearby
+from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, largest_jumps_nearby
 from rollover.diagnosis.forward.filtering import Rows, filtered_like, rows_of
 from rollover.diagnosis.forward.full_run import SENSORS, RunSimulator
+from rollover.diagnosis.forward.instruments import Instruments
 from rollover.diagnosis.forward.interface import EDGES, Array, Simulator
 from rollover.diagnosis.settings import SETTINGS
-from rollover.dynamics.drop_test import BESIDE, DropFailedError, DropModel, Track, channels_of, unfit
+from rollover.dynamics.drop_test import BESIDE, COLUMNS, DropFailedError, DropModel, Track, channels_of, unfit
 from rollover.effects import every, read
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -51,7 +52,7 @@ class DropSimulator:
         self.recording = recording
         self.discontinuities = discontinuities  # whether it says how far channels jump
         # a dict's first key is behind all that were let go of before it
-        self._raw: Store[dict[str, Array]] = OrderedDict()
+        self._raw: Store[Array] = OrderedDict()
         self._models: Store[DropModel] = OrderedDict()
         self._tracks: Store[Track] = OrderedDict()
         self._read_by: Store[Mapping[str, Any]] = OrderedDict()
@@ -70,14 +71,10 @@ class DropSimulator:
             (reads if path.startswith(OF_SENSORS) else moves)[path] = value
         physical, sensors = Exchanged(moves), self._sensors(Exchanged(reads))
         try:
-            channels = self._run(physical, self.rows.times, shift)
-            if sensors:
-                channels = {**channels, **self._edges(physical, shift, sensors)}
-                run = Recording(title=self.recording.title, time=self.rows.times, channels=channels)
-                channels = dict(read({n: e for n, e in sensors.items() if e.id not in EDGES}, run).channels)
+            drop = self._run(physical, self.rows.times, shift)
+            found = self._misread(physical, shift, sensors, drop) if sensors else self.instruments.shown(drop)
         except DropFailedError:
             return None
-        found = filtered_like(channels, self.recording, self.rows)
         return found | self._discontinuities(physical, shift, sensors) if self.discontinuities else found
 
     def perturbed(
@@ -113,6 +110,13 @@ class DropSimulator:
             self._keep(self._read_by, reads.key, found, TUNING.cached_predictions)
         return self._read_by[reads.key]
 
+    def _misread(self, physical: Exchanged, shift: float, sensors: Mapping[str, Any], drop: Array) -> dict[str, Array]:
+        """Channels at the stamps as `sensors` read a drop."""
+        channels = {**channels_of(drop, self.instruments.names), **self._edges(physical, shift, sensors)}
+        run = self._unread.showing(channels)
+        channels = dict(read({n: e for n, e in sensors.items() if e.id not in EDGES}, run).channels)
+        return filtered_like(channels, self.recording, self.rows)
+
     def _discontinuities(self, physical: Exchanged, shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """How far channels that nothing smooths jump about each stamp, under `DISCONTINUITY_IN` and their names."""
         time = self.recording.time
@@ -120,27 +124,32 @@ class DropSimulator:
         if not instants.size:
             return {}
         lags, *clocks = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
-        made = channels_of(rows, self._sharp.difference(lags))
-        return {
-            DISCONTINUITY_IN + name: largest_jump_nearby(_own(time, name, *clocks) - shift, instants, sizes)
-            for name, sizes in made.items()
-            if sizes.any()
-        }
+        jumping = set(np.flatnonzero(rows.any(axis=0)).tolist())
+        sharp = [name for name in self._sharp if name not in lags and COLUMNS[name][0] in jumping]
+        timed = {*clocks[0], *clocks[1]}
+        groups = [(time, [name for name in sharp if name not in timed])]
+        groups += [(_own(time, name, *clocks), [name]) for name in sharp if name in timed]
+        found: dict[str, Array] = {}
+        for own, names in groups:
+            columns = np.array([COLUMNS[name][0] for name in names], dtype=np.int64)
+            sizes = largest_jumps_nearby(own - shift, instants, rows, columns)
+            found |= {DISCONTINUITY_IN + name: size for name, size in zip(names, sizes, strict=True)}
+        return found
 
     def _edges(self, physical: Exchanged, shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a jump lies between the rows."""
         lags, offsets, drifts = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
-        found = {}
-        for channel in {*lags, *offsets, *drifts} & set(self.recording.channels):
+        found: dict[str, Array] = {}
+        for channel in {*lags, *offsets, *drifts} & set(self.instruments.names):
             own = _own(self.rows.times, channel, offsets, drifts)
             key = channel, offsets.get(channel), drifts.get(channel)
             if channel not in lags:
-                found[channel] = self._run(physical, own, shift, key)[channel]
+                found |= channels_of(self._run(physical, own, shift, key), (channel,))
                 continue
             beside = self.contact + shift + np.array([-BESIDE, BESIDE])
             fine = np.concatenate([own, 0.5 * (own[1:] + own[:-1]), beside[(beside > own[0]) & (beside < own[-1])]])
             dense, where = np.unique(fine, return_inverse=True)
-            raw = {channel: self._run(physical, dense, shift, (*key, "dense"))[channel]}
+            raw = channels_of(self._run(physical, dense, shift, (*key, "dense")), (channel,))
             late = lags[channel].read(Recording(title=self.recording.title, time=dense, channels=raw))
             found[channel] = late[channel][where[: own.size]]
         return found
@@ -148,7 +157,17 @@ class DropSimulator:
     @cached_property
     def _sharp(self) -> frozenset[str]:
         """Channels that nothing smooths."""
-        return frozenset(self.recording.channels).difference(self.recording.cfc)
+        return frozenset(self.instruments.names).difference(self.recording.cfc)
+
+    @cached_property
+    def instruments(self) -> Instruments:
+        """What is shown of the drop."""
+        return Instruments(self.recording, self.rows)
+
+    @cached_property
+    def _unread(self) -> Recording:
+        """A recording at the times of the drop, without any channel."""
+        return Recording(title=self.recording.title, time=self.rows.times, channels={})
 
     @cached_property
     def rows(self) -> Rows:
@@ -165,14 +184,13 @@ class DropSimulator:
         below = self.model.motion(times)["ground/sinkage"] > 0.0
         return float(times[np.argmax(below)]) if below.any() else np.inf
 
-    def _run(self, physical: Exchanged, times: Array, shift: float, key: tuple[Any, ...] = ()) -> dict[str, Array]:
-        """The drop before instruments at `times` less `shift`, which `key` stands for beside it."""
+    def _run(self, physical: Exchanged, times: Array, shift: float, key: tuple[Any, ...] = ()) -> Array:
+        """`Track.rows` of the drop at `times` less `shift`, which `key` stands for beside it."""
         values = (*physical.key, *key, shift)
         found = self._raw.get(values)
         if found is None:
             at = times - shift
-            rows = self._track(physical, float(at[-1]) if at.size else 0.0).rows(at)
-            found = channels_of(rows, self.recording.channels)
+            found = self._track(physical, float(at[-1]) if at.size else 0.0).rows(at)
             self._keep(self._raw, values, found, TUNING.cached_predictions)
         return found
 
@@ -188,7 +206,9 @@ class DropSimulator:
         """The drop with values exchanged, its steps as short as it asks for."""
         key, changes = exchange.key, exchange.values
         if key not in self._models:
-            own = exchanged(self.model.scenario, changes) if changes else self.model.scenario
+            base = self.model.scenario
+            is_of_effects = all(path.startswith("effects.") for path in changes)
+            own = base if not changes else base.under(changes) if is_of_effects else exchanged(base, changes)
             has_own = own.ground.law.advance is not None  # states of its own are second order in the step
             is_abrupt = has_own or any(effect.is_abrupt for effect in own.effects.values())
             may_jump = any(effect.force_terms() and not effect.is_smooth for effect in own.effects.values())

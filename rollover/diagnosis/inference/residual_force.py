@@ -88,10 +88,11 @@ def channels_of(way: Way, moves: Moves, e: Dataset, shift: float) -> Array:
     ahead = np.clip((stamps - way.time[at]) / TUNING.step, 0.0, 1.0)[:, None]
     begun = (stamps >= 0.0)[:, None]
     zero_force = np.zeros((stamps.size, z.shape[1]))
-    found = {}
-    for channel in e.recording.channels:
-        y = measured.get(channel)
-        found[channel] = zero_force if y is None else begun * ((1.0 - ahead) * y[at] + ahead * y[at + 1])
+
+    def read(y: Array) -> Array:
+        return np.asarray(begun * ((1.0 - ahead) * y.take(at, axis=0) + ahead * y.take(at + 1, axis=0)))
+
+    found = {c: read(measured[c]) if c in measured else zero_force for c in e.recording.channels}
     return np.asarray(e.marginalised(e.whitened(e.raw(filtered_like(found, e.recording, rows)))))
 
 
@@ -157,8 +158,9 @@ def descent(scenario: Scenario, e: Dataset, block: ResidualBlock) -> Descent | N
     f = linear_b_splines(time, knots) * TUNING.force_prior * float(force.max())
     measured = way
     for _ in range(TUNING.stiffness_rounds):
-        x, _, _ = _free(measured, f, "ground", e, block, rows)
-        dz, dv, da = (m @ x[:-1] for m in _all_moves(measured, f, "ground")[:3])
+        moves = _all_moves(measured, f, "ground")
+        x, _, _ = _free(measured, moves, e, block, rows)
+        dz, dv, da = (m @ x[:-1] for m in moves[:3])
         depth = np.maximum(z + dz, 0.0)
         there = spring(depth, v)
         adaptive_difference = np.where(
@@ -179,7 +181,7 @@ def descent(scenario: Scenario, e: Dataset, block: ResidualBlock) -> Descent | N
     left: dict[str, float] = {}
     free, later = 0.0, {}
     for where in WHERES:
-        x, left[where], free = _free(measured, f, where, e, block, rows)
+        x, left[where], free = _free(measured, _all_moves(measured, f, where), e, block, rows)
         later[where] = float(x[-1]) * block.prior
     return Descent(
         dataset=e, way=measured, shift=block.shift, rows=rows, residual=block.residual, slope=block.slope,
@@ -197,10 +199,10 @@ def _all_moves(way: Way, f: Array, where: Where) -> Moves:
 
 
 def _free(
-    way: Way, f: Array, where: Where, e: Dataset, block: ResidualBlock, rows: NDArray[np.bool_]
+    way: Way, moves: Moves, e: Dataset, block: ResidualBlock, rows: NDArray[np.bool_]
 ) -> tuple[Array, float, float]:
-    """Strengths of forces and of the speed that leave least of a recording, what that is, and how many count."""
-    J = channels_of(way, _all_moves(way, f, where), e, block.shift)[rows]
+    """Strengths of `_all_moves` that leave least of a recording, what that is, and how many count."""
+    J = channels_of(way, moves, e, block.shift)[rows]
     A = np.column_stack([J, block.slope[rows] * block.prior])
     w = block.residual[rows]
     N = A.T @ A

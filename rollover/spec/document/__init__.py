@@ -11,7 +11,7 @@ from typing import Any
 
 from rollover.spec.document.annotated import annotated
 from rollover.spec.document.check import check
-from rollover.spec.document.exchange import Itself, exchanged, value_at
+from rollover.spec.document.exchange import Itself, exchanged, exchanged_below, value_at
 from rollover.spec.document.include import beside, expand, find, headings, named, shipped_folder, stated_kind
 from rollover.spec.document.replace import parse_setting, replaced
 from rollover.spec.document.resolved import Leaf, content_hash, dump, paths, to_mapping, unit_at
@@ -33,6 +33,7 @@ __all__ = [
     "dump",
     "dump_mapping",
     "exchanged",
+    "exchanged_below",
     "find",
     "headings",
     "load",

@@ -47,6 +47,15 @@ def exchanged(thing: T, changes: Mapping[str, Any]) -> T:
     return cast(T, _exchanged(thing, _places(tuple(changes)), dict(enumerate(changes.values()))))
 
 
+def exchanged_below(thing: Any, step: str, changes: Mapping[str, Any]) -> Any:
+    """What stands at one `step` of `thing` with values at paths below it exchanged; the rest of `thing` is not asked.
+
+    Things that share what stands there share what is made of it. Raises as `exchanged` does.
+    """
+    place = _places(tuple(changes))[step]
+    return _exchanged_at(thing, step, place, list(changes.values()))
+
+
 @functools.lru_cache(maxsize=1024)  # a fit exchanges values at the same paths time and again
 def _places(paths: tuple[str, ...]) -> dict[str, _Place]:
     whole = _Place()
@@ -72,12 +81,7 @@ def _exchanged(thing: Any, places: Mapping[str, _Place], values: Mapping[int, An
         if not place.below:
             here[step] = values[cast(int, place.at)]
             continue
-        inner = _part(thing, step) if place.at is None else values[place.at]
-        own = [values[k] for k in place.every]
-        try:
-            here[step] = _shared(Itself(inner), kind, step, place, *own)
-        except TypeError:  # a value without a hash
-            here[step] = _made(inner, kind, step, place, own)
+        here[step] = _exchanged_at(thing, step, place, values)
     if isinstance(thing, tuple):
         names = {getattr(item, "name", None): i for i, item in enumerate(thing)}
         at = {names[step] if step in names else int(step): value for step, value in here.items()}
@@ -88,6 +92,17 @@ def _exchanged(thing: Any, places: Mapping[str, _Place], values: Mapping[int, An
         if step not in known:
             raise KeyError(f"no such path: {step} in {kind.__name__}")
     return replace(thing, **here)
+
+
+def _exchanged_at(thing: Any, step: str, place: _Place, values: Mapping[int, Any] | Sequence[Any]) -> Any:
+    """What stands at a step of a thing, with values exchanged below it."""
+    kind: Any = type(thing)
+    inner = _part(thing, step) if place.at is None else values[place.at]
+    own = [values[k] for k in place.every]
+    try:
+        return _shared(Itself(inner), kind, step, place, *own)
+    except TypeError:  # a value without a hash
+        return _made(inner, kind, step, place, own)
 
 
 def _made(part: Any, kind: Any, step: str, place: _Place, own: Sequence[Any]) -> Any:
