@@ -263,16 +263,6 @@ class Scenario:
             return wheel_estimates(self.vehicle)
         return ()
 
-    def under(self, changes: Mapping[str, Any]) -> Scenario:
-        """Return this scenario with values of its effects exchanged, ``{"effects.mass.added": 3.0}``, for fits.
-
-        Effects keep to their own bounds; what does not hang on them is not checked again. Raises as
-        `document.exchanged` does.
-        """
-        found = copy(self)
-        object.__setattr__(found, "effects", document.exchanged_below(self, "effects", changes))
-        return found
-
     def applied(self) -> Scenario:
         """Return this scenario with the values that its effects replace; the effects stay, for their other terms."""
         changed = self
@@ -362,3 +352,14 @@ def schema(part: Literal["scenario", "vehicle", "rops", "steel", "soil"] = "scen
     """JSON Schema of a scenario file, or of a vehicle, ROPS or soil file on its own."""
     kind: Any = {"scenario": Scenario, "vehicle": AnyVehicle, "rops": Rops, "steel": Steel, "soil": AnyLaw}[part]
     return document.schema(kind, f"rollover {part}")
+
+
+def with_effects_at(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
+    """A scenario with values of its effects exchanged, ``{"effects.mass.added": 3.0}``, for the many runs of a fit.
+
+    Effects keep to their own bounds; what does not hang on them is not checked again. Raises as `document.exchanged`
+    does.
+    """
+    found = copy(scenario)
+    object.__setattr__(found, "effects", document.exchanged_below(scenario, "effects", changes))
+    return found

@@ -111,7 +111,18 @@ class Recording:
         return self.channels[name]
 
     def showing(self, channels: Mapping[str, Array]) -> Recording:
-        """The same with other channels, 64-bit at the same stamps: what is checked of these is not checked again."""
+        """The same stamps with other channels: what is checked of the stamps is not checked again.
+
+        Parameters
+        ----------
+        channels
+            Values of each channel, SI, (n,), 64-bit.
+
+        Returns
+        -------
+        Recording
+            The recording with these channels in place of its own.
+        """
         found = copy(self)
         object.__setattr__(found, "channels", channels)
         return found

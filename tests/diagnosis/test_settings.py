@@ -17,6 +17,7 @@ ROOT = Path(rollover.diagnosis.__file__).parent
 EXCEPTIONS = {
     ("fit/cache.py", "NONE"): "an empty array",
     ("fit/time_shift.py", "UNKNOWN"): "marks what cannot be compared",
+    ("forward/instruments.py", "NO_FILTER"): "marks a channel without a filter class",
     ("inference/intervals.py", "EVENLY"): "standard deviation of the uniform distribution, an identity",
     ("inference/intervals.py", "BOTH"): "the two signs",
 }

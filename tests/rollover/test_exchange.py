@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from rollover.effects import EFFECTS
-from rollover.scenario import Scenario, load
+from rollover.scenario import Scenario, load, with_effects_at
 from rollover.spec.document import exchanged
 
 DROP, OVERTURN = "drop_test", "side_overturn"
@@ -118,11 +118,11 @@ def test_an_unhashable_value_is_exchanged_all_the_same() -> None:
 def test_values_of_effects_alone_are_exchanged_the_same() -> None:
     some = load(DROP)
     twice = {**LAYER, "effects.mass.added": 1.0}
-    found = some.under(twice)
+    found = with_effects_at(some, twice)
     assert found == exchanged(some, twice)
     assert some.effects == {}
-    assert exchanged(some, {"initiation.speed": 2.0}).under(twice).effects is found.effects
+    assert with_effects_at(exchanged(some, {"initiation.speed": 2.0}), twice).effects is found.effects
     with pytest.raises(ValueError, match=r"depth: out of bounds, got -0\.05"):
-        some.under({"effects.soil-layer.depth": -0.05})
+        with_effects_at(some, {"effects.soil-layer.depth": -0.05})
     with pytest.raises(KeyError, match="no such path: depht in SoilLayer"):
-        some.under({"effects.soil-layer.depht": 0.05})
+        with_effects_at(some, {"effects.soil-layer.depht": 0.05})

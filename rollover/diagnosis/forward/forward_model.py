@@ -19,7 +19,7 @@ from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import BESIDE, COLUMNS, DropFailedError, DropModel, Track, channels_of, unfit
 from rollover.effects import every, read
 from rollover.recording import Recording
-from rollover.scenario import Scenario
+from rollover.scenario import Scenario, with_effects_at
 from rollover.spec.document import Itself, exchanged
 from rollover.spec.initiation import Drop
 
@@ -208,7 +208,7 @@ class DropSimulator:
         if key not in self._models:
             base = self.model.scenario
             is_of_effects = all(path.startswith("effects.") for path in changes)
-            own = base if not changes else base.under(changes) if is_of_effects else exchanged(base, changes)
+            own = base if not changes else with_effects_at(base, changes) if is_of_effects else exchanged(base, changes)
             has_own = own.ground.law.advance is not None  # states of its own are second order in the step
             is_abrupt = has_own or any(effect.is_abrupt for effect in own.effects.values())
             may_jump = any(effect.force_terms() and not effect.is_smooth for effect in own.effects.values())
