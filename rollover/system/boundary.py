@@ -29,7 +29,7 @@ _UNFORESEEN = (
 _MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.EIO, errno.ESTALE, errno.EAGAIN)
 _OF_CODE = re.compile(
     r"NoneType|\w+(?:Error|Exception)\b|\[Errno|\bobject\b|0x[0-9a-f]{6,}|<class|codec|\bbuffer\b|dtype|ndarray|\(\)"
-    r"|\binvalid literal\b|could not convert"
+    r"|\binvalid literal\b|could not convert|\barray element\b|\binhomogeneous\b"
 )
 
 

@@ -38,7 +38,8 @@ _PLACE = re.compile(r"\s*\S.*?: \S")
 # how libraries and Python word things that nobody asked about
 _BARE = re.compile(
     r"\b[A-Z]\w+(Error|Exception|Warning)\b|NoneType|object has no attribute|Errno|<class |object at 0x|Traceback"
-    r"|'utf-?8' codec|can't decode|invalid literal|could not convert|unpack requires|not subscriptable"
+    r"|'(utf-?8|ascii)' codec|can't decode|invalid literal|could not convert|unpack requires|not subscriptable"
+    r"|index out of range|setting an array element|inhomogeneous"
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from rollover.recording.importers import read_recording
 from rollover.scenario import load
+from rollover.spec.document import headings
 from rollover.system.errors import InputError
 from tests.fuzz.oracle import is_whole
 
@@ -166,3 +168,26 @@ def test_a_name_that_no_file_can_have_is_none(line: str, tmp_path: Path) -> None
         assert str(caught.value).startswith(f"{tmp_path / 's.yaml'}:{line.count(chr(10)) + 1}: ")
     said = driven(tmp_path, f"file: {'n' * 5000}.csv")
     assert said.startswith(f"{tmp_path / 's.yaml'}:4: inputs.table.angle_deg.file: no such file")
+
+
+def test_a_pipe_a_device_or_a_folder_is_told_as_one(tmp_path: Path) -> None:
+    """Nothing waits for a pipe, and what is there is not called missing, with itself as what was meant."""
+    os.mkfifo(tmp_path / "pipe.yaml")
+    (tmp_path / "zero.yaml").symlink_to("/dev/zero")
+    (tmp_path / "folder.yaml").mkdir()
+    for name in ("pipe.yaml", "zero.yaml", "folder.yaml"):
+        (tmp_path / "s.yaml").write_text(f"base: {name}\n")
+        with pytest.raises(InputError) as caught:
+            load(tmp_path / "s.yaml")
+        said = str(caught.value)
+        assert is_whole(said) == ""
+        assert f"base: not a file, got '{name}', a folder, a device or a pipe" in said
+
+
+def test_what_a_circle_describes_is_not_guessed(tmp_path: Path) -> None:
+    for name, other in (("a", "b"), ("b", "a")):
+        (tmp_path / f"{name}.yaml").write_text(f"base: {other}.yaml\n")
+    with pytest.raises(
+        InputError, match=r"a file includes itself, got \S*a.yaml -> \S*b.yaml -> \S*a.yaml; no circles"
+    ):
+        headings(tmp_path / "a.yaml")

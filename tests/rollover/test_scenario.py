@@ -179,6 +179,14 @@ ONE_FAULT: dict[str, tuple[str | bytes, str]] = {
         without("title: Drop", "title: !foo Drop"),
         "bad.yaml:1: title: unknown tag, got !foo; plain values are allowed",
     ),
+    "tag of a mapping": (
+        without("title: Drop", "title: !!python/object:os.x {a: 1}"),
+        "bad.yaml:1: title: unknown tag, got tag:yaml.org,2002:python/object:os.x; plain values are allowed",
+    ),
+    "tag of a row": (
+        without("title: Drop", "title: !!python/tuple [1.0, 2.0]"),
+        "bad.yaml:1: title: unknown tag, got tag:yaml.org,2002:python/tuple; plain values are allowed",
+    ),
     "list as key": ("? [1]\n: 2\n", "bad.yaml:1: a key is not text, got a list or mapping; keys are plain words"),
     "nested": ("[" * 4000, "bad.yaml:1: nested too deeply; a few levels are needed"),
     "missing vehicle file": (

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import gzip
 import math
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 from ground.drops import Drop, UnusableDrop, found_contact
 from rollover.recording import Clock, Recording
 from rollover.recording.importers.bluedrop import COLUMNS, RATE, read_log
-from rollover.recording.importers.importer import Collection
+from rollover.recording.importers.importer import Collection, reading
 from rollover.system.errors import Fault, InputError
 
 Array = NDArray[np.float64]
@@ -154,20 +153,37 @@ def _drag(falling: Array, speed: float) -> float:
 
 
 def _table(path: Path) -> dict[str, Array]:
-    try:
+    with reading(path, "penetrometer"):
         with gzip.open(path, "rb") as file:
             data = file.read(LARGEST + 1)
         if len(data) > LARGEST:
-            raise InputError(Fault(file=str(path), message=f"unpacks to more than {LARGEST} bytes; that is no drop"))
-        lines = data.decode("ascii").splitlines()
-        if tuple(lines[0].split(",")) != COLUMNS:
-            raise ValueError(f"got columns {lines[0][:80]}; {', '.join(COLUMNS)} are needed")
-        rows = np.array([line.split(",") for line in lines[1:]], dtype=np.float64)
-    except (OSError, EOFError, zlib.error, IndexError, UnicodeDecodeError, ValueError) as e:
-        if isinstance(e, InputError):
-            raise
-        raise InputError(Fault(file=str(path), message=f"not a drop of the penetrometer: {e}")) from None
-    return {name: rows[:, k] for k, name in enumerate(COLUMNS)}
+            message = f"unpacks to too much, got more than {LARGEST} bytes; a table of one cut drop is needed"
+            raise InputError(Fault(file=str(path), message=message))
+        head, *lines = data.decode("ascii").splitlines() or [""]
+        if tuple(head.split(",")) != COLUMNS:
+            message = f"not a drop of the penetrometer, got columns {head[:80]!r}; {', '.join(COLUMNS)} are needed"
+            raise InputError(Fault(file=str(path), message=message))
+        rows = [line.split(",") for line in lines]
+        odd = next((k for k, row in enumerate(rows) if len(row) != len(COLUMNS)), None)
+        if odd is not None or not rows:
+            got = "no row" if odd is None else f"{len(rows[odd])} cells in row {odd + 1}"
+            message = f"not a drop of the penetrometer, got {got}; {len(COLUMNS)} numbers in each row are needed"
+            raise InputError(Fault(file=str(path), message=message))
+        try:
+            values = np.array(rows, dtype=np.float64)
+        except ValueError:
+            k, cell = next((k, cell) for k, row in enumerate(rows) for cell in row if not _is_number(cell))
+            message = f"row {k + 1}: not a number, got {cell!r}; {len(COLUMNS)} numbers in each row are needed"
+            raise InputError(Fault(file=str(path), message=message)) from None
+    return {name: values[:, k] for k, name in enumerate(COLUMNS)}
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 SOIL_PENETROMETER = Collection(

@@ -51,8 +51,8 @@ def headings(path: Path) -> dict[str, Node]:
     """
     found: dict[str, Node] = {}
     chain: list[Path] = []
-    while path.resolve() not in chain:
-        chain.append(path.resolve())
+    while True:
+        chain.append(path)
         root = read(path)
         below = root.value if isinstance(root.value, Mapping) else {}
         found = {**below, **found}
@@ -62,6 +62,7 @@ def headings(path: Path) -> dict[str, Node]:
         file = _file(base)
         if file is None:
             raise _missing(base, BASE)
+        _check_no_circle(base, file, chain, BASE)
         path = file
     return found
 
@@ -178,6 +179,13 @@ def beside(name: str, node: Node) -> Path | None:
     return next((f / name for f in (node.place.folder, shipped_folder()) if _is_file(f / name)), None)
 
 
+def _is_there(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
 def _is_file(path: Path) -> bool:
     """Whether a path leads to a file; a name that no file can have, or a folder that is closed, leads nowhere."""
     try:
@@ -218,6 +226,9 @@ def _missing(node: Node, path: str) -> InputError:
     """The fault of a name that means no file, with the nearest that does."""
     name = Path(str(node.value))
     folders = (node.place.folder, shipped_folder())
+    if any(_is_there(f / name) and not _is_file(f / name) for f in folders):
+        message = f"not a file, got {node.value!r}, a folder, a device or a pipe; a plain YAML file is needed"
+        return node.place.fault(path, message)
     known: set[str] = set()
     with suppress(OSError):  # of a folder that no name can be of
         known |= {(name.parent / p.name).as_posix() for f in folders for p in (f / name).parent.glob("*.yaml")}
@@ -230,13 +241,19 @@ def _missing(node: Node, path: str) -> InputError:
     return node.place.fault(path, f"no such file, got {node.value!r}; {cure}")
 
 
+def _check_no_circle(node: Node, file: Path, chain: Sequence[Path], path: str) -> None:
+    """Refuse a file that is being read already. Raises `InputError`."""
+    read_already = [f.resolve() for f in chain]
+    if file.resolve() in read_already:
+        names = [shown(f) for f in (*chain[read_already.index(file.resolve()) :], file)]
+        raise node.place.fault(path, f"a file includes itself, got {' -> '.join(names)}; no circles")
+
+
 def _included(node: Node, slot: Slot, chain: tuple[Path, ...], path: str) -> Node:
     file = _file(node)
     if file is None:
         raise _missing(node, path)
-    if file.resolve() in chain:
-        names = [shown(f) for f in (*chain[chain.index(file.resolve()) :], file)]
-        raise node.place.fault(path, f"a file includes itself, got {' -> '.join(names)}; no circles")
+    _check_no_circle(node, file, chain, path)
     root = read(file)
     if not isinstance(root.value, Mapping):
         raise root.place.fault("", f"not a mapping, got {root.in_short}; {slot.allowed()} is needed")

@@ -24,6 +24,7 @@ from rollover.system.errors import Fault, InputError, cured
 CURE = "plain values, lists and mappings of them are allowed"
 SYNTAX = "quote text that holds : # [ ] { } & * ! %, and indent with blanks"
 _TAG = "tag:yaml.org,2002:"
+_PLAIN = (f"{_TAG}map", f"{_TAG}seq", f"{_TAG}str")  # of mappings, lists, and rows of numbers as they are read
 
 Scalar = str | int | float | bool | None
 
@@ -152,6 +153,9 @@ class _Builder:
         if id(node) in inside:
             raise place.fault(path, "contains itself through an alias")
         inside = (*inside, id(node))
+        listed = isinstance(node, (MappingNode, SequenceNode)) or node.style == yaml_reader.ROW_STYLE
+        if listed and str(node.tag) not in _PLAIN:
+            self._fault(place, path, f"unknown tag, got {node.tag}; plain values are allowed")
         if isinstance(node, MappingNode):
             return Node(value=self._mapping(node, path, inside), place=place, key=key)
         if isinstance(node, SequenceNode):
