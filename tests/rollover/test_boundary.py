@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import random
 import struct
@@ -19,9 +18,7 @@ import pytest
 from rollover.comparison.run_pair import read as result
 from rollover.recording import Recording, read_parquet
 from rollover.recording.importers import COLLECTIONS, importers, read_recording, write_recording
-from rollover.recording.importers.bluedrop import COLUMNS
 from rollover.recording.importers.importer import Collection, Importer
-from rollover.recording.importers.soil_penetrometer import LARGEST
 from rollover.system import boundary
 from rollover.system.errors import Fault, InputError, has_cure
 from tests.fuzz import seeds, sets, texts
@@ -376,28 +373,3 @@ def test_a_case_that_somebody_else_wrote_is_run_again(tmp_path: Path) -> None:
     for other in others:
         pq.write_table(other, path)
         assert shelf.stored(tmp_path, key) is None
-
-
-# ---- the table of a cut drop, which the published set holds beside its logs
-
-HEAD = ",".join(COLUMNS)
-ROW = ",".join("0.1" for _ in COLUMNS)
-TABLES: dict[str, tuple[bytes, str]] = {
-    "a word": (f"{HEAD}\n{ROW}\nabc{ROW[3:]}\n".encode(), "row 2: not a number, got 'abc'; 9 numbers in each row"),
-    "a short row": (f"{HEAD}\n{ROW}\n1,2\n".encode(), "got 2 cells in row 2; 9 numbers in each row"),
-    "no row": (HEAD.encode(), "got no row; 9 numbers in each row"),
-    "nothing": (b"", "got columns ''; t_s, a2g"),
-    "no text": (f"{HEAD}\n".encode() + b"\xe9", "not a readable penetrometer file: damaged"),
-    "too much": (bytes(LARGEST + 1), "unpacks to too much, got more than 67108864 bytes; a table of one cut drop"),
-}
-
-
-@pytest.mark.parametrize("what", TABLES)
-def test_a_damaged_table_of_a_drop_is_told_in_words(what: str, tmp_path: Path) -> None:
-    data, said = TABLES[what]
-    path = tmp_path / "a_main_drop.csv.gz"
-    path.write_bytes(gzip.compress(data, 1))
-    with pytest.raises(InputError) as caught:
-        list(COLLECTIONS["soil-penetrometer"].read(path, ["*"]))
-    assert is_whole(str(caught.value)) == ""
-    assert said in str(caught.value)
