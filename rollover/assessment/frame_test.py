@@ -91,10 +91,9 @@ def frame_test(
     rows: list[Criterion] = []
     for load, requirement in pairs(loads, asked):
         entry = tests[[e["name"] for e in tests].index(load.name)]
-        broken = [
-            f"{e['broken']} gave way in load {e['name']!r}" for e in tests[: tests.index(entry)] if e.get("broken")
-        ]
-        rows.append(_judged(load, entry, requirement, broken[0] if broken else ""))
+        broken = (e for e in tests[: tests.index(entry)] if e.get("broken"))
+        before = next((f"{e['broken']} gave way in load {e['name']!r}" for e in broken), "")
+        rows.append(_judged(load, entry, requirement, before))
         if entry["overload"] and requirement.source == STATIC:
             rows.append(overload(load, entry, requirement))
     return FrameTest(

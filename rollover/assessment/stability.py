@@ -43,7 +43,7 @@ UNLOADED = 0.002  # share of its load on level ground with which a wheel carries
 SLIPS = 0.02
 REST = 1e-5  # residual forces and moments over the weight
 NEAR, LEAST, SADDLE = 0.1, 1e-6, 1e-5  # m or rad at a time; damping, and instability, over the contacts' stiffness
-PERTURBATION = 1e-4
+PERTURBATION = 1e-4  # m or rad: the first step off a saddle, four times as long each time it leads back; chosen
 PATIENCE = 400
 
 

@@ -19,15 +19,16 @@ from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.ensemble_validation import restarted_base
 from rollover.diagnosis.selection.explanation import Explanation, kind_of, with_conditions_refitted
 from rollover.diagnosis.selection.forward_step import (
+    becomes,
     by_chance,
     confusion_set,
     explains_nearly_all,
+    held_out_gain,
     is_same_family,
     step,
 )
 from rollover.diagnosis.selection.screening import score_candidates
 from rollover.diagnosis.settings import SETTINGS
-from rollover.effects import EFFECTS
 from rollover.scenario import Scenario
 
 TUNING = SETTINGS.report.grades
@@ -136,17 +137,13 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
     same family. What becomes the best at an end of its range, as a layer a stiffness, is no rival.
     """
     near = confusion_set(one, groups, problem.samples_per_error, is_refuted=True)
-    best, start = one.fitted, float(held_out(one.base, groups).chi2.sum())
-    most = start - float(held_out(best, groups).chi2.sum())
+    best, most = one.fitted, held_out_gain(one, one.fitted, groups)
     probable = credible(problem, one.rivals)
     for rival in one.rivals:
-        becomes_best = is_at_bound(rival) and best.candidates[-1].id in EFFECTS[rival.candidates[-1].id].becomes
-        if becomes_best or any(rival is f for f in near):
+        if becomes(rival, best) or any(rival is f for f in near):
             continue
-        gain = start - float(held_out(rival, groups).chi2.sum())
-        is_probable = any(rival is f for f in probable) and (
-            is_same_family(rival, best) or gain > TUNING.half_share * most
-        )
+        explains_half = held_out_gain(one, rival, groups) > TUNING.half_share * most
+        is_probable = any(rival is f for f in probable) and (is_same_family(rival, best) or explains_half)
         if is_probable or (is_tolerated(problem, rival) and explains_nearly_all(one, rival, groups)):
             near.append(rival)
     return near

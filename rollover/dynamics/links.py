@@ -12,10 +12,10 @@ from rollover.dynamics.occupant import Point, Row, occupant_rows
 from rollover.kernels import links as k
 from rollover.kernels.tables import HITCH, SUSPENSION
 from rollover.scenario import Scenario
-from rollover.spec.bogie import Bogie, damped
+from rollover.spec.bogie import damped
 from rollover.spec.frames import angles, matrices, rotation_vector
 from rollover.spec.suspension import GUIDE
-from rollover.spec.vehicle import Vehicle, Wheel
+from rollover.spec.vehicle import Vehicle, Wheel, carrier_of
 
 Array = NDArray[np.float64]
 
@@ -54,11 +54,6 @@ def link_rows(
 def sprung(vehicle: Vehicle) -> list[Wheel]:
     """Wheels with a suspension."""
     return [w for w in vehicle.wheels if w.suspension is not None]
-
-
-def carrier_of(vehicle: Vehicle, bogie: Bogie) -> str:
-    """Name of the body that a bogie's pin is on: that of its wheels."""
-    return next(w.carrier for w in vehicle.wheels if w.bogie == bogie.name)
 
 
 def _strut(wheel: Wheel) -> list[float]:

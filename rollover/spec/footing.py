@@ -6,7 +6,7 @@ from rollover.spec.connector import Connector
 from rollover.spec.estimates import turning_inertia
 from rollover.spec.inertia import MassProperties
 from rollover.spec.mechanism import Joint, free_motions, in_words
-from rollover.spec.vehicle import Carrier, Vehicle, carried, hubs
+from rollover.spec.vehicle import Carrier, Vehicle, carried, carrier_of, hubs
 
 RIGID = 1e6  # of the stiffest tyre: what stands for the pivot, whose root is a thousandth of what round-off would blur
 
@@ -62,8 +62,7 @@ def check_standing(vehicle: Vehicle) -> None:
             rotational_stiffness=(stiff, 0.0, stiff),
         )
         parts[b.part] = b.body
-        carrier = next(w.carrier for w in vehicle.wheels if w.bogie == b.name)
-        joints.append(Joint(path=f"bogies.{b.name}", below=carrier, above=b.part, connector=pin))
+        joints.append(Joint(path=f"bogies.{b.name}", below=carrier_of(vehicle, b), above=b.part, connector=pin))
     if motions := free_motions(parts, joints, gravity=0.0):
         free = motions[0]
         names = [w.name for w in vehicle.wheels if w.carrier in free.parts or w.hub in free.parts]

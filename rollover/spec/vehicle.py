@@ -183,8 +183,8 @@ class Vehicle:
                 raise ValueError(f"wheels.{w.name}.suspension: got it on {w.carrier!r}; null, or carrier 'chassis'")
             if w.suspension is not None and w.bogie is not None:
                 raise ValueError(f"wheels.{w.name}.suspension: got it on bogie {w.bogie!r}; null, or bogie null")
-        beams = {w.bogie for w in self.wheels if w.bogie is not None}
-        stands = {b: [(w.carrier, w.centre) for w in self.wheels if w.bogie == b] for b in sorted(beams)}
+        named = sorted({w.bogie for w in self.wheels if w.bogie is not None})
+        stands = {b: [(w.carrier, w.centre) for w in self.wheels if w.bogie == b] for b in named}
         check_bogies(self.bogies, stands)
         there = {"chassis": True, "front_axle": self.front_axle, "rops": self.rops, "trailer": self.trailer}
         for a in self.attached:
@@ -311,8 +311,12 @@ def hubs(vehicle: Vehicle | RigidBody) -> dict[str, MassProperties]:
 
 def beams(vehicle: Vehicle | RigidBody, carrier: str) -> list[MassProperties]:
     """Mass properties of the bogies on the chassis or on the trailer."""
-    on = {w.bogie for w in vehicle.wheels if w.carrier == carrier}
-    return [b.body for b in vehicle.bogies if b.name in on]
+    return [b.body for b in vehicle.bogies if carrier_of(vehicle, b) == carrier]
+
+
+def carrier_of(vehicle: Vehicle | RigidBody, bogie: Bogie) -> Carrier:
+    """Name of the body that a bogie's pin is on: that which carries its wheels."""
+    return next(w.carrier for w in vehicle.wheels if w.bogie == bogie.name)
 
 
 def _without(whole: MassProperties, parts: list[MassProperties]) -> MassProperties:
@@ -328,12 +332,11 @@ def alone(vehicle: Vehicle) -> Vehicle:
     if vehicle.trailer is None:
         return vehicle
     wheels = tuple(w for w in vehicle.wheels if w.carrier != "trailer")
-    on = {w.bogie for w in wheels}
     return replace(
         vehicle,
         trailer=None,
         wheels=wheels,
-        bogies=tuple(b for b in vehicle.bogies if b.name in on),
+        bogies=tuple(b for b in vehicle.bogies if carrier_of(vehicle, b) != "trailer"),
         attached=tuple(a for a in vehicle.attached if a.carried_by != "trailer"),
     )
 

@@ -1,7 +1,7 @@
 """Where each channel stands in a recording for the viewer, and how it looks: path, name, unit, colour. Data only.
 
 Paths are ``<group>/<channel with _ for />_<unit>/<source>``, source being ``simulated``, ``measured``, ``limit``,
-``scatter`` or ``peak``, so that a measured recording or a limit joins the same plot. People read kN, deg, mm and kJ.
+``neighbours`` or ``peak``, so that a measured recording or a limit joins the same plot. People read kN, deg, mm and kJ.
 """
 
 from __future__ import annotations

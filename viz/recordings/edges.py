@@ -42,9 +42,9 @@ def edges(surface: Surface, outer: Rectangle, spacing: tuple[float, float] = (0.
 def _breaks(part: Part, outer: Rectangle) -> Iterator[NDArray[np.float64]]:
     """Both ends (2, 2) of each line along which a part of the surface breaks; beyond the rectangle if it has no end."""
     if isinstance(part, Kerb):
-        places, point = ([0.0, part.height / math.tan(math.radians(part.face_deg))], part.foot)
+        places, point = [0.0, part.height / math.tan(math.radians(part.face_deg))], part.foot
     elif isinstance(part, Bank):
-        places, point = ([0.0, part.height / math.tan(math.radians(part.angle_deg))], part.edge)
+        places, point = [0.0, part.height / math.tan(math.radians(part.angle_deg))], part.edge
     elif isinstance(part, Ditch):
         inner = 0.5 * part.bottom
         wide = inner + part.depth / math.tan(math.radians(part.angle_deg))

@@ -341,7 +341,7 @@ def confusion_set(step_: Step, groups: Groups, shared: float = 1.0, *, is_refute
     And those of no more numbers that meet all recordings as well as it does: what hangs on a single one is hard to
     predict without it, and not wrong for that. None that becomes the best itself at the end of its range, as a layer
     whose top is the ground's. Where what the best leaves refutes its form (`is_refuted`), which of its family has the
-    right one is not told by who leaves least: those that explain nearly all that it does are rivals too.
+    right one is not decided by who leaves least: those that explain nearly all that it does are rivals too.
     """
     best, base = step_.fitted, step_.base
     found = [best]
@@ -365,11 +365,20 @@ def confusion_set(step_: Step, groups: Groups, shared: float = 1.0, *, is_refute
 
 def is_same_family(rival: Fitted, best: Fitted) -> bool:
     """Whether two fits' effects are of one family, and the one does not become the other at an end of its range."""
-    one, other = rival.candidates[-1], best.candidates[-1]
-    return one.family == other.family and not (is_at_bound(rival) and other.id in EFFECTS[one.id].becomes)
+    return rival.candidates[-1].family == best.candidates[-1].family and not becomes(rival, best)
+
+
+def becomes(rival: Fitted, best: Fitted) -> bool:
+    """Whether a fit stands at an end of its effect's range, where it is declared to become the best one's."""
+    return is_at_bound(rival) and best.candidates[-1].id in EFFECTS[rival.candidates[-1].id].becomes
+
+
+def held_out_gain(step_: Step, fitted: Fitted, groups: Groups) -> float:
+    """Sum of squares that a fit takes from what the base leaves of conditions held out."""
+    return float(held_out(step_.base, groups).chi2.sum() - held_out(fitted, groups).chi2.sum())
 
 
 def explains_nearly_all(step_: Step, rival: Fitted, groups: Groups) -> bool:
     """Whether a rival gains nearly all of what the best does on conditions held out."""
-    start, least, left = (float(held_out(f, groups).chi2.sum()) for f in (step_.base, step_.fitted, rival))
-    return start - left >= SETTINGS.report.grades.nearly_all * (start - least)
+    most = held_out_gain(step_, step_.fitted, groups)
+    return held_out_gain(step_, rival, groups) >= SETTINGS.report.grades.nearly_all * most

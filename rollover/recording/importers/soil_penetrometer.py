@@ -20,6 +20,7 @@ from ground.drops import Drop, UnusableDrop, found_contact
 from rollover.recording import Clock, Recording
 from rollover.recording.importers.bluedrop import COLUMNS, RATE, read_log
 from rollover.recording.importers.importer import Collection, reading
+from rollover.recording.text_rows import refuse
 from rollover.system.errors import Fault, InputError
 
 Array = NDArray[np.float64]
@@ -158,23 +159,23 @@ def _table(path: Path) -> dict[str, Array]:
             data = file.read(LARGEST + 1)
         if len(data) > LARGEST:
             message = f"unpacks to too much, got more than {LARGEST} bytes; a table of one cut drop is needed"
-            raise InputError(Fault(file=str(path), message=message))
+            refuse(path, message)
         head, *lines = data.decode("ascii").splitlines() or [""]
         if tuple(head.split(",")) != COLUMNS:
             message = f"not a drop of the penetrometer, got columns {head[:80]!r}; {', '.join(COLUMNS)} are needed"
-            raise InputError(Fault(file=str(path), message=message))
+            refuse(path, message)
         rows = [line.split(",") for line in lines]
         odd = next((k for k, row in enumerate(rows) if len(row) != len(COLUMNS)), None)
         if odd is not None or not rows:
             got = "no row" if odd is None else f"{len(rows[odd])} cells in row {odd + 1}"
             message = f"not a drop of the penetrometer, got {got}; {len(COLUMNS)} numbers in each row are needed"
-            raise InputError(Fault(file=str(path), message=message))
+            refuse(path, message)
         try:
             values = np.array(rows, dtype=np.float64)
         except ValueError:
             k, cell = next((k, cell) for k, row in enumerate(rows) for cell in row if not _is_number(cell))
             message = f"row {k + 1}: not a number, got {cell!r}; {len(COLUMNS)} numbers in each row are needed"
-            raise InputError(Fault(file=str(path), message=message)) from None
+            refuse(path, message)
     return {name: values[:, k] for k, name in enumerate(COLUMNS)}
 
 

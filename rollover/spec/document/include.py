@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -179,17 +179,15 @@ def beside(name: str, node: Node) -> Path | None:
     return next((f / name for f in (node.place.folder, shipped_folder()) if _is_file(f / name)), None)
 
 
-def _is_there(path: Path) -> bool:
-    try:
-        return path.exists()
-    except (OSError, ValueError):
-        return False
-
-
 def _is_file(path: Path) -> bool:
     """Whether a path leads to a file; a name that no file can have, or a folder that is closed, leads nowhere."""
+    return _answer(path.is_file)
+
+
+def _answer(of_path: Callable[[], bool]) -> bool:
+    """What is asked of a path; no where it is a name that no file can have, or in a folder that is closed."""
     try:
-        return path.is_file()
+        return of_path()
     except (OSError, ValueError):
         return False
 
@@ -226,7 +224,7 @@ def _missing(node: Node, path: str) -> InputError:
     """The fault of a name that means no file, with the nearest that does."""
     name = Path(str(node.value))
     folders = (node.place.folder, shipped_folder())
-    if any(_is_there(f / name) and not _is_file(f / name) for f in folders):
+    if any(_answer((f / name).exists) and not _is_file(f / name) for f in folders):
         message = f"not a file, got {node.value!r}, a folder, a device or a pipe; a plain YAML file is needed"
         return node.place.fault(path, message)
     known: set[str] = set()
