@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -16,6 +16,7 @@ from typing import Any, cast
 from rollover.proof.commitment import Seal, opened, sealed, write_truth
 from rollover.proof.generator import Case, Order
 from rollover.proof.handover import fingerprint, write_case
+from rollover.proof.kept import Answer, Kept
 from rollover.proof.score import score
 from rollover.proof.summary import tally
 from rollover.system.processes import map_cases
@@ -116,10 +117,13 @@ def prove(
     workers: int | None = None,
     time_limit: float | None = None,
     diagnosis: str = DIAGNOSIS,
+    kept: Kept | None = None,
     on_seal: Callable[[Seal], None] = lambda seal: None,
     show: Callable[[int, int], None] = lambda done, of: None,
 ) -> Proof:
     """Make, seal, diagnose, open, score. `on_seal` is called before the first diagnosis, `show` after each case.
+
+    What is `kept` of the same campaign is not diagnosed again; whoever has written the report clears it.
 
     `rig` is one of `RIGS`; a `background` (share of the range, or ``drawn``) is put on every case, of drops only.
 
@@ -128,26 +132,24 @@ def prove(
     """
     more = {} if background is None else {"background": background}
     orders = orders_of(count, seed, rig=rig, kinds=kinds, effects=effects, background=background)
-    with scratch() as given, scratch() as kept:
+    with scratch() as given, scratch() as apart:
         folders = [Path(given) / order.name for order in orders]
         ordered = made_cases(orders, folders, rig=rig, workers=workers)
-        seal = sealed(ordered)
-        path = write_truth(ordered, seal, Path(kept))
+        shown = None if kept is None else kept.seal()
+        seal = sealed(ordered, None if shown is None else shown.salt)
+        path = write_truth(ordered, seal, Path(apart))
+        if kept is not None:
+            kept.begin(seal)
         on_seal(seal)
-        tasks = [Handed(folder=f, out=Path(given) / "out" / f.name, diagnosis=diagnosis) for f in folders]
-        answers: dict[int, tuple[dict[str, Any] | None, str, float]] = {}
-        for done, answer in enumerate(map_cases(diagnosed, tasks, workers=workers, time_limit=time_limit), start=1):
-            sentence = answer.failure.sentence if answer.failure else ""
-            answers[answer.index] = (answer.value, sentence, answer.wall_time)
-            show(done, len(tasks))
+        handed = {f: str(t["handed_over"]) for f, t in zip(folders, ordered, strict=True)}
+        answers = _answers(handed, diagnosis, kept, show, workers=workers, time_limit=time_limit)
         found = opened(seal.digest, path)
-        changed = [f.name for f, t in zip(folders, found, strict=True) if fingerprint(f) != t["handed_over"]]
-        if changed:
-            raise RuntimeError(f"{changed[0]}: its recordings were changed by the diagnosis")
+        for folder, mark in handed.items():
+            _check_unchanged(folder, mark)
     rows = []
-    for i, truth in enumerate(found):
-        value, sentence, seconds = answers[i]
-        rows.append({**score(truth, value, seconds), "failure": sentence})
+    for order, truth in zip(orders, found, strict=True):
+        answer = answers[order.name]
+        rows.append({**score(truth, answer.diagnosis, answer.seconds), "failure": answer.sentence})
     report = {
         "format": FORMAT,
         "cases": count,
@@ -160,5 +162,41 @@ def prove(
         "summary": tally(rows),
         "rows": rows,
     }
-    diagnoses = {orders[i].name: value for i, (value, _, _) in sorted(answers.items()) if value is not None}
+    diagnoses = {order.name: value for order in orders if (value := answers[order.name].diagnosis) is not None}
     return Proof(report=report, seal=seal, truths=found, diagnoses=diagnoses)
+
+
+def _answers(
+    handed: Mapping[Path, str],
+    diagnosis: str,
+    kept: Kept | None,
+    show: Callable[[int, int], None],
+    *,
+    workers: int | None,
+    time_limit: float | None,
+) -> dict[str, Answer]:
+    """What came of each case, by its name; of cases that are kept what came of them before.
+
+    `handed` are folders with their fingerprints. A process that was ended is no answer of its case: that is not kept.
+    """
+    before = {f.name: kept.answer(f.name) for f in handed} if kept is not None else {}
+    answers = {name: answer for name, answer in before.items() if answer is not None}
+    if answers:
+        show(len(answers), len(handed))
+    left = [f for f in handed if f.name not in answers]
+    tasks = [Handed(folder=f, out=f.parent / "out" / f.name, diagnosis=diagnosis) for f in left]
+    for outcome in map_cases(diagnosed, tasks, workers=workers, time_limit=time_limit):
+        folder, failure = left[outcome.index], outcome.failure
+        _check_unchanged(folder, handed[folder])
+        sentence = failure.sentence if failure else ""
+        answer = Answer(diagnosis=outcome.value, sentence=sentence, seconds=outcome.wall_time)
+        answers[folder.name] = answer
+        if kept is not None and (failure is None or failure.kind != "crash"):
+            kept.keep(folder.name, answer)
+        show(len(answers), len(handed))
+    return answers
+
+
+def _check_unchanged(folder: Path, handed: str) -> None:
+    if fingerprint(folder) != handed:
+        raise RuntimeError(f"{folder.name}: its recordings were changed by the diagnosis")

@@ -34,6 +34,7 @@ from rollover.system.names import inside
 
 PART, OLD, COMMIT, REPLACE = ".part", ".old", ".commit", ".replace"
 NOTES = "fits"  # what a diagnosis has fitted so far, for a next start to go on with
+CAMPAIGN = "cases"  # what came of the cases of a blind proof so far, likewise
 SCRATCH = "rollover-"  # how temporary folders begin
 _MOST_BYTES = 200  # of a name that others are made of; with what is added it stays below the 255 of a file system
 _MODES = 0o666, 0o777
@@ -197,13 +198,14 @@ def exchange(part: Path, target: Path) -> None:
 
 def own(target: Path, name: str) -> bool:
     """Whether a file is one of those that stand beside `target`, or in it, while it is written."""
-    return name in (f"{_prefix(target)}lock", f"{_prefix(target)}{NOTES}") or _left(target).fullmatch(name) is not None
+    known = [f"{_prefix(target)}{what}" for what in ("lock", NOTES, CAMPAIGN)]
+    return name in known or _left(target).fullmatch(name) is not None
 
 
-def notes(target: Path) -> Path:
+def notes(target: Path, what: str = NOTES) -> Path:
     """Where a command may keep what it has worked out so far, until its results stand there."""
     target = _resolved(target)
-    return _anchor(target) / f"{_prefix(target)}{NOTES}"
+    return _anchor(target) / f"{_prefix(target)}{what}"
 
 
 @contextlib.contextmanager

@@ -24,7 +24,8 @@ REPORT_FILES = (JSON, SEAL, TRUTH, DIAGNOSES, PAGE)
     epilog=manual(
         "prove --cases 50 --seed 1",
         "prove --cases 20 --export out/cases",
-        writes="prove.json, report.html, seal.json, truth.json, diagnoses.jsonl; with --export sealed cases.",
+        writes="prove.json, report.html, seal.json, truth.json, diagnoses.jsonl; with --export sealed cases. "
+        "Run again after an interrupt, it goes on.",
         status="3 every diagnosis failed",
     )
 )
@@ -85,7 +86,11 @@ def prove(
     """Make concealed cases (drops by an independent solver), seal the truth, diagnose them, open the seal and score."""
     from rollover.assessment import results
     from rollover.cli import console
+    from rollover.proof import kept as kept_cases
     from rollover.proof import runner
+    from rollover.proof.kept import Kept
+    from rollover.system import own_code
+    from rollover.system.writing import CAMPAIGN, notes
 
     rig = rig or ("overturn" if "foreign-engine" in (kinds or []) else "drop")
     if export is None and truth is not None:
@@ -115,8 +120,16 @@ def prove(
     about |= {"background": _share_of(background)} if background is not None else {}
     results.claim_report(out, runner.FORMAT, about, REPORT_FILES, force=force)
 
+    code = {"package": kept_cases.code(), **{kind: own_code.hashes(kind) for kind in own_code.KINDS}}
+    asked = {"rig": rig, "background": None, **about, "time_limit": time_limit}
+    # beside the results folder, which is written whole or not at all: what came of the cases so far
+    kept = Kept(folder=notes(out, CAMPAIGN), asked={**asked, "versions": results.versions(), "code": code})
+    kept.claim(out, force=force)
+
     def tell(seal: Seal) -> None:
-        console.say(f"Sealed: the truth of {seal.cases} cases has the hash {seal.digest}; the diagnosis starts now.")
+        done = kept.answered()
+        now = f"{done} of them were diagnosed before an interrupt" if done else "the diagnosis starts now"
+        console.say(f"Sealed: the truth of {seal.cases} cases has the hash {seal.digest}; {now}.")
 
     with console.counting("cases") as show:
         try:
@@ -130,6 +143,7 @@ def prove(
                 workers=workers,
                 time_limit=time_limit,
                 diagnosis=runner.DIAGNOSIS,
+                kept=kept,
                 on_seal=tell,
                 show=show,
             )
@@ -147,6 +161,7 @@ def prove(
 
         text = page(report, command=_command(cases, seed, about), versions=report["versions"])
         (part / PAGE).write_text(text, encoding="utf-8")
+    kept.clear()
     if as_json:
         print(json.dumps(report, indent=2))
     else:
