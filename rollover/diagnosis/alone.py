@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from rollover.diagnosis.fit.cross_validation import Groups, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.linearisation import Fitted, is_at_bound
+from rollover.diagnosis.fit.linearisation import Fitted, is_at_bound, without_shift_direction
 from rollover.diagnosis.fit.local_search import with_time_shift_search
 from rollover.diagnosis.fit.step import Inquiry, Step
 from rollover.diagnosis.grades import jackknifed, share_beyond, share_of, shares
@@ -15,7 +17,7 @@ from rollover.diagnosis.inference.lack_of_fit import is_tolerated, mismatch_of
 from rollover.diagnosis.inference.repeated_course import predicted_by_others, quick_channels
 from rollover.diagnosis.inference.residual_law import fitted_law
 from rollover.diagnosis.probabilities import credible, log_evidence
-from rollover.diagnosis.result import Verdict
+from rollover.diagnosis.result import Share, Verdict
 from rollover.diagnosis.selection.ensemble_validation import restarted_base
 from rollover.diagnosis.selection.explanation import Explanation, kind_of, with_conditions_refitted
 from rollover.diagnosis.selection.forward_step import (
@@ -100,8 +102,8 @@ def verdict_on_single_effect(
     Otherwise nothing is said to be there where the scenario alone leaves no more than the discrepancy, unless a part
     of that is surely predicted: something is there then that no name fits.
 
-    How large a discrepancy is that references taught is known without the effect: what surely predicts, by more than
-    that lends itself to, is named however much of it is left.
+    How large a discrepancy is that references taught is known without the effect: what predicts more than nothing does,
+    by more than that lends itself to, and is surely shown by the recordings (D28), is named however much is left.
     """
     nothing: Verdict = "no-mismatch" if is_tolerated(problem, found.base) else "unexplained"
     if not found.parts:
@@ -123,9 +125,29 @@ def verdict_on_single_effect(
     is_sure = (
         whole is not None and whole.share >= TUNING.half_share and whole.low > TUNING.sure_share and len(families) == 1
     )
-    if is_enough or is_sure or (is_taught and whole is not None and whole.low > 0.0):
+    is_shown = is_taught and whole is not None and whole.share > 0.0
+    if is_enough or is_sure or (is_shown and times_shown(found.base, found.fitted, groups).low > 0.0):
         return found, kind_of(found.fitted.candidates[-1])
     return found.refused(), nothing
+
+
+def times_shown(base: Fitted, fitted: Fitted, groups: Groups) -> Share:
+    """How many times recordings show what a fit adds to a base, its interval by how often each group does, (D28).
+
+    With w what the base leaves and D what the fit changes of it, time shifts aside, sum(D'w)/sum(D'D), which is 1 where
+    a fit is at rest: twice as many standard errors from none as what D predicts of w is, 2 D'w - D'D.
+    """
+    shown, due = [], []
+    for before, after in zip(base.blocks, fitted.blocks, strict=True):
+        w = after.counted(before.unweighted_residual)
+        D = w - after.counted(after.unweighted_residual)
+        w, D = without_shift_direction(np.stack([w, D], axis=1), after).T
+        shown.append(float(D @ w))
+        due.append(float(D @ D))
+    if sum(due) <= 0.0:
+        return Share(share=0.0, low=-np.inf, high=1.0)
+    numbers = len(fitted.x) - len(base.x)
+    return jackknifed(np.array(shown), np.array(due), groups, numbers)
 
 
 def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:

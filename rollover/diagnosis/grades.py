@@ -63,21 +63,22 @@ def _due(problem: Problem, base: Fitted, groups: Groups) -> Array:
     return np.asarray(held_out(base, groups).chi2 - noise)
 
 
-def jackknifed(gained: Array, due: Array, groups: Groups) -> Share:
+def jackknifed(gained: Array, due: Array, groups: Groups, numbers: int = 1) -> Share:
     """Ratio sum(gained)/sum(due) of recordings (n,) with an interval by what each group leaves of it.
 
-    The linearised jackknife (Cochran, Sampling Techniques, 1977, 6.4): where nearly all is due in one group, the ratio
-    of the others is of next to nothing, and says nothing of the whole.
+    `numbers` were fitted to the groups, each of which takes a degree of freedom. The linearised jackknife (Cochran,
+    Sampling Techniques, 1977, 6.4): where nearly all is due in one group, the ratio of the others is of next to
+    nothing, and says nothing of the whole.
     """
     from scipy.special import stdtrit
 
     share = float(gained.sum() / due.sum())
     deviations = np.array([float(np.sum(gained[list(g)] - share * due[list(g)])) for g in groups])
     m = deviations.size
-    if m < 2:
+    if m < 1 + numbers:
         return Share(share=min(share, 1.0), low=-np.inf, high=1.0)
-    error = float(np.sqrt(m / (m - 1) * np.sum(deviations**2)) / due.sum())
-    wide = float(stdtrit(m - 1, TUNING.one_sided_confidence)) * error
+    error = float(np.sqrt(m / (m - numbers) * np.sum(deviations**2)) / due.sum())
+    wide = float(stdtrit(m - numbers, TUNING.one_sided_confidence)) * error
     return Share(share=min(share, 1.0), low=share - wide, high=min(share + wide, 1.0))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import alone
-from rollover.diagnosis.alone import alike_beside, best_predictor, verdict_on_single_effect
+from rollover.diagnosis.alone import alike_beside, best_predictor, times_shown, verdict_on_single_effect
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
@@ -101,21 +102,67 @@ def test_an_effect_is_named_where_it_predicts_half(
     assert bool(found.parts) == (verdict == "missing-physics")
 
 
+def shown(times: Sequence[float], held: Sequence[float], numbers: int = 1) -> tuple[Fitted, Fitted]:
+    """What leaves unit squares of each recording, and a fit whose course of a fifth of these they show so many times.
+
+    `held` are the mean squares that the fit leaves of each held out, of which the other leaves 1.
+    """
+    base, best = nothing((1.0,) * len(times)), fitted("soil-layer", held, numbers)
+    blocks = []
+    for k, (block, often) in enumerate(zip(base.blocks, times, strict=True)):
+        D = np.sqrt(0.2) * np.ones(SAMPLES)
+        rest = block.residual - np.mean(block.residual)
+        left = often * D + rest * np.sqrt(max(1.0 - 0.2 * often**2, 0.0) * SAMPLES / (rest @ rest))
+        blocks.append((replace(block, residual=left), replace(best.blocks[k], residual=left - D)))
+    base, best = (replace(f, blocks=tuple(b[k] for b in blocks)) for k, f in enumerate((base, best)))
+    return base, best
+
+
+EACH, ONE = (1.0, 0.6, 1.3, 1.1, 0.9, 1.1), (0.3, 0.1, 5.2, 0.0, 0.2, 0.2)  # how many times drops show an effect
+LESS, MORE = (0.8, 0.97, 0.7, 0.8, 0.8, 0.8), (0.8, 1.3, 0.9, 1.2, 1.1, 1.1)  # what is left of them held out
+
+
 @pytest.mark.parametrize(
-    ("left", "p_value", "is_named"),
+    ("times", "held", "p_value", "is_named"),
     [
-        ((0.6, 0.7, 0.8, 0.7, 0.8, 0.6), 1e-9, True),  # a fifth, of each recording
-        ((0.6, 1.0, 1.2, 0.7, 0.6, 0.7), 1e-9, False),  # of some alone: maybe none
-        ((0.6, 0.7, 0.8, 0.7, 0.8, 0.6), 0.01, False),  # the best of all gains as much by chance
+        (EACH, LESS, 1e-9, True),  # a fifth, of each recording
+        (EACH, (0.6, 1.05, 0.7, 0.9, 1.0, 0.7), 1e-9, True),  # predicted worse in one, though it is shown by it too
+        (ONE, LESS, 1e-9, False),  # by one alone: maybe none
+        (EACH, MORE, 1e-9, False),  # nothing does better
+        (EACH, LESS, 0.01, False),  # the best of all gains as much by chance
     ],
 )
-def test_beside_what_references_taught_a_sure_part_is_named(
-    left: tuple[float, ...], p_value: float, is_named: bool
+def test_beside_what_references_taught_what_each_shows_is_named(
+    times: tuple[float, ...], held: tuple[float, ...], p_value: float, is_named: bool
 ) -> None:
-    one = explanation(SOME, fitted("soil-layer", left), p_value=p_value)
+    base, best = shown(times, held)
+    one = replace(explanation(SOME, best, p_value=p_value), base=base)
+    one = replace(one, parts=(replace(one.parts[0], base=base),))
     assert verdict_on_single_effect(PROBLEM, one, GROUPS)[1] in ("unexplained", "no-mismatch")
     found, said = verdict_on_single_effect(PROBLEM, one, GROUPS, is_taught=True)
     assert (bool(found.parts), said == "missing-physics") == (is_named, is_named)
+
+
+def test_an_effect_of_chance_is_rarely_shown_by_all() -> None:
+    """Of numbers drawn about none their mean is outside a t interval in a twentieth; each number takes a degree."""
+    rng, trials, m = np.random.default_rng(5), 1500, 4
+    for numbers, most in ((1, 0.05), (2, 0.03)):
+        hits = 0
+        for _ in range(trials):
+            true = rng.standard_normal((m, numbers))
+            mean = true.mean(axis=0)
+            blocks = [
+                [
+                    ResidualBlock(residual=v, J=np.zeros((numbers, 0)), slope=np.zeros(numbers), shift=0.0, prior=1.0)
+                    for v in (w, w - mean)
+                ]
+                for w in true
+            ]
+            base, best = nothing((1.0,) * m), fitted("soil-layer", (1.0,) * m, numbers)
+            base, best = (replace(f, blocks=tuple(b[k] for b in blocks)) for k, f in enumerate((base, best)))
+            hits += times_shown(base, best, [[r] for r in range(m)]).low > 0.0
+        assert hits / trials == pytest.approx(most, abs=4.0 * np.sqrt(most / trials))
+    assert times_shown(base, best, [[0, 1], [2, 3]]).low == -np.inf  # two numbers of two conditions: nothing is known
 
 
 def test_a_gain_is_one_draw_however_many_recordings_repeat_it() -> None:
