@@ -130,11 +130,16 @@ def verdict_on_single_effect(
 
 
 def shown_quickly(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict] | None:
-    """What shows by being quicker than the discrepancy, (D28), if it predicts some of it and leaves no more."""
+    """What shows by being quicker than the discrepancy, (D28), if it predicts half of what it leaves, and surely some.
+
+    It leaves no more than the discrepancy.
+    """
     one = found.parts[0]
     fitted = shown_beside(problem, one.base, (one.fitted, *one.rivals), len(found.scored.scores))
     share = None if fitted is None else share_of(problem, one.base, fitted, groups)
-    if fitted is None or share is None or share.low <= 0.0 or not is_tolerated(problem, fitted):
+    if fitted is None or share is None or not is_tolerated(problem, fitted):
+        return None
+    if share.low <= 0.0 or share.share < TUNING.sure_share:
         return None
     shown = replace(found, fitted=fitted, parts=(replace(one, fitted=fitted),))
     return shown, kind_of(fitted.candidates[-1])

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
-from rollover.diagnosis.inference.slow_discrepancy import gram, shown_beside
+from rollover.diagnosis.inference.slow_discrepancy import gain, gram, shown_beside
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.recording import Recording
-from tests.diagnosis.drops import DEPTH, FORCE, recorded
+from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
 from tests.diagnosis.test_discrepancy import curved, judged
 
 SCALE, MEMORY = {FORCE: 0.04, DEPTH: 0.02}, {FORCE: 0.05, DEPTH: 0.08}
@@ -79,6 +80,22 @@ def test_a_slow_wave_alone_shows_no_effect(seed: int) -> None:
     assert shown_beside(problem, *fits_beside(problem), 40) is None
 
 
+def test_what_the_model_misses_is_no_sensor() -> None:
+    problem = judged(curved(0.02, 5, changes={"effects.soil-stiffness.scale": 1.3}), SCALE, MEMORY)
+    base, fits = fits_beside(problem)
+    gains = {f.label: gain(problem, base, f) for f in fits}
+    assert max(gains, key=lambda label: gains[label]) == "soil-stiffness"
+    assert gains["soil-stiffness"] > 100.0
+    assert shown_beside(problem, base, fits, 40) is None
+
+
 def test_nothing_is_said_where_no_correlation_time_is_known() -> None:
     problem = judged(recorded({}, 1), SCALE)
     assert shown_beside(problem, *fits_beside(problem), 40) is None
+
+
+def test_a_diagnosis_names_a_lag_beside_a_wave() -> None:
+    late = diagnose(scenario(), [(name, lagging(r)) for name, r in curved(0.02, 5)])
+    (one,) = late.effects
+    assert (late.verdict, one.id, one.channel) == ("sensor", "sensor-lag", FORCE)
+    assert one.parameters["time"].low < 0.005 < one.parameters["time"].high

@@ -35,7 +35,7 @@ def shown_beside(problem: Problem, base: Fitted, fits: Sequence[Fitted], candida
     """
     from scipy.stats import chi2
 
-    if problem.effort.is_ensemble or not all(_is_known(e) for e in problem.dataset):
+    if problem.effort.is_ensemble or not any(_is_known(e, s) for e in problem.dataset for s in e.signals):
         return None
     able = [f for f in fits if not is_at_bound(f)]
     if not able:
@@ -49,24 +49,25 @@ def shown_beside(problem: Problem, base: Fitted, fits: Sequence[Fitted], candida
 
 
 def gain(problem: Problem, base: Fitted, fitted: Fitted) -> float:
-    """Squares that a fit takes of what a base leaves, 2 d'S^-1 m - d'S^-1 d with m what it leaves, d the difference.
+    """Squares m'S^-1 m that a fit leaves less than a base, over all recordings, each at its own clock.
 
-    Of each recording at the base's clock; its time shift, uncertain conditions and zeros are marginalised.
+    Time shifts, uncertain conditions and zeros are marginalised.
     """
-    return sum(_gain_in(problem, r, base, fitted, b.shift) for r, b in enumerate(base.blocks))
+    left = [[_left(problem, r, f, b.shift) for r, b in enumerate(f.blocks)] for f in (base, fitted)]
+    return float(sum(before - after for before, after in zip(*left, strict=True)))
 
 
-def _gain_in(problem: Problem, r: int, base: Fitted, fitted: Fitted, shift: float) -> float:
-    e = problem.dataset[r]
-    here = problem.raw(r, base.candidates, base.x, shift)
-    there = problem.raw(r, fitted.candidates, fitted.x, shift)
-    if here is None or there is None:
-        return 0.0
-    later = problem.clock_slope(r, base.candidates, base.x, shift, here) * e.shift_prior
-    G = gram(e, np.stack([there - here, e.values - here, later, *_uncertain(e)], axis=1), e.simulator.contact + shift)
-    free, held = G[:2, 2:], G[2:, 2:]
-    M = G[:2, :2] - free @ np.linalg.solve(np.eye(held.shape[0]) + held, free.T)
-    return float(2.0 * M[0, 1] - M[0, 0])
+def _left(problem: Problem, r: int, fitted: Fitted, shift: float) -> float:
+    e, raw = problem.dataset[r], problem.raw(r, fitted.candidates, fitted.x, shift)
+    if raw is None:
+        return np.inf
+    later = problem.clock_slope(r, fitted.candidates, fitted.x, shift, raw) * e.shift_prior
+    G = gram(e, np.stack([e.values - raw, later, *_uncertain(e)], axis=1), e.simulator.contact + shift)
+    # the shift's prior is about zero: (tau + dtau)^2/sd^2
+    held, target = G[1:, 1:] + np.eye(G.shape[0] - 1), G[1:, 0].copy()
+    at = shift / e.shift_prior
+    target[0] -= at
+    return float(G[0, 0] + at**2 - target @ np.linalg.solve(held, target))
 
 
 def _uncertain(e: Dataset) -> list[Array]:
@@ -80,10 +81,14 @@ def _uncertain(e: Dataset) -> list[Array]:
 
 
 def gram(e: Dataset, columns: Array, contact: float) -> Array:
-    """X'S^-1 X of columns X (n, m), SI, stacked, with the first contact at a time of the recording, s."""
+    """X'S^-1 X of columns X (n, m), SI, stacked, with the first contact at a time of the recording, s.
+
+    Of signals whose discrepancy has a known correlation time: what noise hides has none.
+    """
     found = np.zeros((columns.shape[1], columns.shape[1]))
     for s, part in e.spans():
-        found += _gram_of(e, s, columns[part], contact)
+        if _is_known(e, s):
+            found += _gram_of(e, s, columns[part], contact)
     return found
 
 
@@ -140,6 +145,6 @@ def _advanced(X: Array, k: int) -> Array:
     return X if k == 0 else np.concatenate([X[k:], np.zeros((k, X.shape[1]))])
 
 
-def _is_known(e: Dataset) -> bool:
-    """Whether scale and correlation time of the discrepancy are known of all signals."""
-    return bool(e.discrepancy) and all(s.channel in e.discrepancy and s.channel in e.memory for s in e.signals)
+def _is_known(e: Dataset, s: Signal) -> bool:
+    """Whether scale and correlation time of a signal's discrepancy are known."""
+    return s.channel in e.discrepancy and s.channel in e.memory
