@@ -104,7 +104,7 @@ def verdict_on_single_effect(
     of that is surely predicted: something is there then that no name fits.
 
     How large a discrepancy is that references taught is known without the effect: what predicts more than nothing does,
-    by more than that lends itself to, and is surely shown by the recordings (D28), is named however much is left.
+    by more than that lends itself to, and is surely shown by the recordings (D29), is named however much is left.
     """
     nothing: Verdict = "no-mismatch" if is_tolerated(problem, found.base) else "unexplained"
     if not found.parts:
@@ -149,7 +149,7 @@ def shown_quickly(problem: Problem, found: Explanation, groups: Groups) -> tuple
 
 
 def times_shown(base: Fitted, fitted: Fitted, groups: Groups) -> Share:
-    """How many times recordings show what a fit adds to a base, its interval by how often each group does, (D28).
+    """How many times recordings show what a fit adds to a base, its interval by how often each group does, (D29).
 
     With w what the base leaves and D what the fit changes of it, time shifts aside, sum(D'w)/sum(D'D), which is 1 where
     a fit is at rest: twice as many standard errors from none as what D predicts of w is, 2 D'w - D'D.

@@ -30,7 +30,8 @@ SIGNAL = SimpleNamespace(rows=np.arange(SAMPLES), noise=0.1, sigma=1.0, channel=
 PROBLEM = cast(
     Problem,
     SimpleNamespace(
-        dataset=[SimpleNamespace(signals=[SIGNAL], model_error_dominates=lambda s: True)] * DROPS,
+        dataset=[SimpleNamespace(signals=[SIGNAL], model_error_dominates=lambda s: True, discrepancy={}, memory={})]
+        * DROPS,
         samples_per_error=10.0,
         samples_per_draw=10.0 * DROPS,
         effort=SimpleNamespace(is_ensemble=False),
@@ -67,8 +68,9 @@ def nothing(left: Sequence[float]) -> Fitted:
 def explanation(base: Sequence[float], best: Fitted, *rivals: Fitted, p_value: float = 1e-9) -> Explanation:
     one = Step(base=nothing(base), fitted=best, p_value=p_value, rivals=(best, *rivals))
     empty: Any = None
+    scored = ScoreTest(score=0.0, scores={}, null=np.zeros(1), detectable={})
     return Explanation(
-        base=one.base, fitted=best, parts=(one,), scored=empty, detectable={}, before=empty, after=empty, first=one
+        base=one.base, fitted=best, parts=(one,), scored=scored, detectable={}, before=empty, after=empty, first=one
     )
 
 
