@@ -15,8 +15,9 @@ from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.planning.choosing import choice
 from rollover.diagnosis.planning.planned import Instruments, planned, showing
-from rollover.diagnosis.planning.separation import Tests, choice
+from rollover.diagnosis.planning.separation import Tests
 from rollover.diagnosis.result import NextTest
 from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import COLUMNS, unfit

@@ -4,11 +4,10 @@ Recordings whitened, y = s_A(t) + n. What stays of the effect A at strength t wh
 errors are refitted is d = (1 - P_B) s_A(t), and lambda = |d|^2 its noncentrality.
 
     detection  the gain of A over nothing is chi^2(k, lambda); seen if above the quantile of the false alarms    (P1)
-    choice     D = |r_B|^2 - |r_A|^2 after one number of each is refitted; with L = |s_A|^2 beside nothing and
-               c^2 = 1 - lambda/L the squared cosine of the two, D is a product of two independent normal numbers:
-               P(A) = Phi(g) Phi(h) + Phi(-g) Phi(-h),  g^2 = L (1 - c)/2,  h^2 = L (1 + c)/2                    (P2)
+    choice     of `choosing`                                                                              (P2), (P3)
 
-Of two that are nearly alike, or where nothing is fitted, (P2) is Phi(sqrt(lambda)/2).
+Where samples lie about a jump, as at the first contact, is not known before a test: lambda and the choice are means
+over where the jump may fall within a sampling step.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.linearisation import Fitted, without_shift_direction
+from rollover.diagnosis.fit.linearisation import Fitted, at_an_end, without_shift_direction
 from rollover.diagnosis.fit.parameterisation import (
     Candidate,
     coordinate,
@@ -34,6 +33,7 @@ from rollover.diagnosis.fit.parameterisation import (
     null_of,
     physical,
 )
+from rollover.diagnosis.planning.choosing import Tangent, choice, right_choice
 from rollover.diagnosis.planning.planned import showing
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, units_of
@@ -61,6 +61,7 @@ class Tests:
         self.dataset = tuple(dataset)
         self.problem = Problem(self.dataset)
         self._moved: dict[tuple[str, tuple[float, ...]], Array | None] = {}
+        self._phases: dict[tuple[int, str, tuple[float, ...]], tuple[Problem, Fitted] | None] = {}
         self._shown: dict[tuple[str, tuple[float, ...]], tuple[Problem, float] | None] = {}
 
     @cached_property
@@ -114,21 +115,59 @@ class Tests:
         found = self.recorded(c, x)
         if found is None:
             return None
-        recorded, far = found
+        far = found[1]
         nearest = self._nearest(c, x, rival)
         if not nearest or nearest[0][0] > TUNING.certain_noncentrality:
             least = min([far, *(chi2 for chi2, _ in nearest)])
-            x_rival = nearest[0][1] if nearest else ()
-        else:
-            fits = [
-                recorded.fit((rival,), point, rounds=TUNING.rounds, width=1) for _, point in nearest[: TUNING.starts]
-            ]
-            best = min((f for f in fits if f is not None), key=lambda f: f.total, default=None)
-            if best is not None:  # noise-free, a search ends where a round gains less than noise would hide: too early
-                ended = recorded.fit((rival,), best.x, rounds=TUNING.rounds, finely=True)
-                best = best if ended is None else min(best, ended, key=lambda f: f.total)
-            least, x_rival = (far, ()) if best is None else (min(best.total, far), best.x)
-        return Apart(noncentrality=least, probability=choice(least, far), x=x_rival)
+            return Apart(noncentrality=least, probability=choice(least, far), x=nearest[0][1] if nearest else ())
+        starts, each = [point for _, point in nearest[: TUNING.starts]], []
+        for phase in range(TUNING.phases):
+            one = self._apart_at(phase, c, x, rival, starts)
+            each += [] if one is None else [one]
+            if one is not None and one.noncentrality > TUNING.beyond_doubt:
+                break
+        if not each:
+            return Apart(noncentrality=far, probability=choice(far, far), x=())
+        noncentrality, probability = (
+            float(np.mean(v)) for v in zip(*((a.noncentrality, a.probability) for a in each), strict=True)
+        )
+        return Apart(noncentrality=noncentrality, probability=probability, x=each[0].x)
+
+    def recorded_at(self, phase: int, c: Candidate, x: tuple[float, ...]) -> tuple[Problem, Fitted] | None:
+        """`recorded` where jumps fall elsewhere within a sampling step, and the effect's own fit; each as its own."""
+        key = (phase, c.key, x)
+        if key not in self._phases:
+            many = len(self.dataset)
+            steps = [float(np.median(np.diff(e.recording.time))) for e in self.dataset]
+            late = [((phase + r) % TUNING.phases + 0.5) / TUNING.phases - 0.5 for r in range(many)]
+            shifts = [f * step for f, step in zip(late, steps, strict=True)]
+            raws = [self.problem.predicted_with_jumps(r, (c,), x, s) for r, s in enumerate(shifts)]
+            made = [showing(e, raw) for e, raw in zip(self.dataset, raws, strict=True) if raw is not None]
+            problem = Problem(made)
+            problem.shifts = shifts
+            own = problem.fit((c,), x, rounds=TUNING.rounds, finely=True) if len(made) == many else None
+            self._phases[key] = None if own is None else (problem, own)
+        return self._phases[key]
+
+    def _apart_at(
+        self, phase: int, c: Candidate, x: tuple[float, ...], rival: Candidate, starts: Sequence[tuple[float, ...]]
+    ) -> Apart | None:
+        """The same at one phase of the samples; None where nothing can be fitted."""
+        found = self.recorded_at(phase, c, x)
+        if found is None:
+            return None
+        recorded, own = found
+        fits = [recorded.fit((rival,), point, rounds=TUNING.rounds, width=1) for point in starts]
+        best = min((f for f in fits if f is not None), key=lambda f: f.total, default=None)
+        if best is None:
+            return None
+        # noise-free, a search ends where a round gains less than noise would hide: too early
+        for shifts in (recorded.shifts, [b.shift for b in best.blocks]):
+            ended = recorded.fit((rival,), best.x, rounds=TUNING.rounds, shifts=shifts, finely=True)
+            best = best if ended is None else min(best, ended, key=lambda f: f.total)
+        least = max(best.total - own.total, 0.0)
+        (d, there), (_, here) = _without_clocks(best), _without_clocks(own)
+        return Apart(noncentrality=least, probability=right_choice(least, d, here, there), x=best.x)
 
     def _nearest(self, c: Candidate, x: tuple[float, ...], rival: Candidate) -> list[tuple[float, tuple[float, ...]]]:
         """What the rival leaves of an effect along the secants to its places, the least first, and where these lead."""
@@ -148,6 +187,13 @@ class Tests:
             else:
                 found.append((float(d @ d) - along**2 * size, there))
         return sorted(found)
+
+
+def _without_clocks(fitted: Fitted) -> tuple[Array, Tangent]:
+    """What a fit leaves, (n,), and its slopes, freed of clocks."""
+    both = np.concatenate([without_shift_direction(np.column_stack([b.residual, b.J]), b) for b in fitted.blocks])
+    inwards = tuple((1 if v < 0.5 else -1) if at_an_end(v) else 0 for v in fitted.x)
+    return both[:, 0], Tangent(slopes=both[:, 1:], inwards=inwards)
 
 
 def usual(c: Candidate) -> Coordinates | None:
@@ -234,18 +280,3 @@ def required_noncentrality(power: float, size: float, freedoms: int = 1) -> floa
     if power <= size:
         return 0.0
     return float(brentq(lambda v: detection(v, size, freedoms) - power, 0.0, 1e4))
-
-
-def choice(noncentrality: float, unopposed: float = math.inf) -> float:
-    """(P2): probability that the misfit chooses the right one of two; `unopposed` is L, of the effect alone."""
-    if math.isinf(unopposed):
-        return _normal(0.5 * math.sqrt(noncentrality))
-    cosine = math.sqrt(max(1.0 - noncentrality / unopposed, 0.0)) if unopposed > 0.0 else 1.0
-    # 1 - c without the rounding of a difference
-    g = math.sqrt(0.5 * min(noncentrality, unopposed) / (1.0 + cosine))
-    h = math.sqrt(0.5 * unopposed * (1.0 + cosine))
-    return _normal(g) * _normal(h) + _normal(-g) * _normal(-h)
-
-
-def _normal(z: float) -> float:
-    return 0.5 * math.erfc(-z / math.sqrt(2.0))

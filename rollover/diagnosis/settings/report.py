@@ -117,6 +117,11 @@ class Planning:
     order: int = 8
     rounds: int = 8  # rounds of a rival's fit to another effect's traces; chosen
     starts: int = 2  # places at which a rival's fit begins; chosen
+    # places of a jump within a sampling step, evenly: promises spread over 0.05 among them, means of four within 0.02
+    phases: int = 4
+    # noncentrality at one of them, from which on the others are not looked at: 0.5 erfc(sqrt(60/8)) = 5e-5
+    beyond_doubt: float = 60.0
+    quasi_draws: int = 8192  # of the noise in a choice: 0.001 of a probability; a power of two, as Sobol' points need
     # noncentrality beyond which a pair is told apart whatever a better fit leaves: 0.5 erfc(sqrt(400/8)) = 3e-23
     certain_noncentrality: float = 400.0
     # ratio to the noncentrality that is just detectable, at which effects are held against each other: twice as strong
