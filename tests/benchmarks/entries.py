@@ -17,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +137,9 @@ def main() -> None:
     asked.add_argument("--by", choices=list(WAYS), required=True)
     asked.add_argument("--out", type=Path, required=True)
     given = asked.parse_args()
+    package, _ = WAYS[given.by]
+    if package and find_spec(package) is None:
+        asked.error(f"--by {given.by}: {package} is not installed; uv sync --group benchmark")
     given.out.write_text(json.dumps(answered(given.folder, given.by), indent=1), encoding="utf-8")
 
 
