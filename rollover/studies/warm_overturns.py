@@ -4,8 +4,9 @@ import gc
 from contextlib import suppress
 
 from rollover.studies.case import warm_up
+from rollover.system import own_code
 
-with suppress(Exception):  # the first case will say what is wrong
+with suppress(Exception), own_code.none_named():  # the first case will say what is wrong
     warm_up("full", "compiled")
 gc.collect()
 gc.freeze()  # what stays for good is not searched again and again by each child

@@ -140,13 +140,16 @@ def test_a_server_imports_what_is_the_packages_own(monkeypatch: pytest.MonkeyPat
 
 
 def test_kernels_of_a_study_are_there_before_its_children() -> None:
+    """And no file of one's own, which may be another one by the next study."""
     code = (
         "import rollover.studies.warm_drops as a\nfrom rollover.kernels import drop_integrator, time_loop\n"
         "print(bool(drop_integrator.fall.signatures), bool(time_loop.advance.signatures))\n"
         "import rollover.studies.warm_overturns as b\nprint(bool(time_loop.advance.signatures))\n"
+        "import os, sys\nprint(os.environ['ROLLOVER_EFFECTS'][-16:], any('rollover_effects_' in name for name in sys.modules))\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["True", "False", "True"]
+    own = {**os.environ, "ROLLOVER_EFFECTS": str(Path(__file__).with_name("faulty_effect.py"))}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=own)
+    assert done.stdout.split() == ["True", "False", "True", "faulty_effect.py", "False"]
 
 
 @pytest.mark.parametrize(
