@@ -145,7 +145,8 @@ def test_kernels_of_a_study_are_there_before_its_children() -> None:
         "import rollover.studies.warm_drops as a\nfrom rollover.kernels import drop_integrator, time_loop\n"
         "print(bool(drop_integrator.fall.signatures), bool(time_loop.advance.signatures))\n"
         "import rollover.studies.warm_overturns as b\nprint(bool(time_loop.advance.signatures))\n"
-        "import os, sys\nprint(os.environ['ROLLOVER_EFFECTS'][-16:], any('rollover_effects_' in name for name in sys.modules))\n"
+        "import os, sys\nprint(os.environ['ROLLOVER_EFFECTS'][-16:])\n"
+        "print(any(name.startswith('rollover_effects_') for name in sys.modules))\n"
     )
     own = {**os.environ, "ROLLOVER_EFFECTS": str(Path(__file__).with_name("faulty_effect.py"))}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=own)
