@@ -14,6 +14,7 @@ from rollover.diagnosis.grades import jackknifed, share_beyond, share_of, shares
 from rollover.diagnosis.inference.lack_of_fit import is_tolerated, mismatch_of
 from rollover.diagnosis.inference.repeated_course import predicted_by_others, quick_channels
 from rollover.diagnosis.inference.residual_law import fitted_law
+from rollover.diagnosis.inference.slow_discrepancy import shown_beside
 from rollover.diagnosis.probabilities import credible, log_evidence
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.ensemble_validation import restarted_base
@@ -110,7 +111,7 @@ def verdict_on_single_effect(
     is_by_chance = found.parts[0].p_value > SETTINGS.inference.lack_of_fit.p_value
     # what lends itself to a discrepancy that drops repeat does not predict half of it from drop to drop
     if is_by_chance and (whole is None or whole.low < TUNING.half_share):
-        return found.refused(), nothing
+        return shown_quickly(problem, found, groups) or (found.refused(), nothing)
     if whole is not None and whole.low > 0.0:
         nothing = "unexplained"
     families = {f.candidates[-1].family for f in confusion_set(found.parts[0], groups, problem.samples_per_error)}
@@ -125,7 +126,23 @@ def verdict_on_single_effect(
     )
     if is_enough or is_sure or (is_taught and whole is not None and whole.low > 0.0):
         return found, kind_of(found.fitted.candidates[-1])
-    return found.refused(), nothing
+    return shown_quickly(problem, found, groups) or (found.refused(), nothing)
+
+
+def shown_quickly(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict] | None:
+    """What shows by being quicker than the discrepancy, (D28), if it predicts half of what it leaves, and surely some.
+
+    It leaves no more than the discrepancy.
+    """
+    one = found.parts[0]
+    fitted = shown_beside(problem, one.base, (one.fitted, *one.rivals), len(found.scored.scores))
+    share = None if fitted is None else share_of(problem, one.base, fitted, groups)
+    if fitted is None or share is None or not is_tolerated(problem, fitted):
+        return None
+    if share.low <= 0.0 or share.share < TUNING.sure_share:
+        return None
+    shown = replace(found, fitted=fitted, parts=(replace(one, fitted=fitted),))
+    return shown, kind_of(fitted.candidates[-1])
 
 
 def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:

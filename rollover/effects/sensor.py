@@ -13,6 +13,7 @@ from ground.compiled import compiled
 from ground.quantity import Quantity, parameters
 from rollover.effects.effect import CHANNELS_OWN, Effect, Heard, Kind, Search
 from rollover.recording import Recording
+from rollover.recording.record import with_channels
 from rollover.spec.channels import describe, is_known
 
 Array = NDArray[np.float64]
@@ -50,7 +51,7 @@ def is_length(channel: str) -> bool:
 
 
 def _with(recording: Recording, channel: str, values: Array) -> Recording:
-    return recording.showing({**recording.channels, channel: values})
+    return with_channels(recording, {**recording.channels, channel: values})
 
 
 @compiled

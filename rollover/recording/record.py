@@ -110,23 +110,6 @@ class Recording:
         """Values of a channel, (n,)."""
         return self.channels[name]
 
-    def showing(self, channels: Mapping[str, Array]) -> Recording:
-        """The same stamps with other channels: what is checked of the stamps is not checked again.
-
-        Parameters
-        ----------
-        channels
-            Values of each channel, SI, (n,), 64-bit.
-
-        Returns
-        -------
-        Recording
-            The recording with these channels in place of its own.
-        """
-        found = copy(self)
-        object.__setattr__(found, "channels", channels)
-        return found
-
     def until(self, n: int) -> Recording:
         """The beginning of a recording.
 
@@ -162,3 +145,10 @@ class Recording:
         """
         there = np.isfinite(self.channels[name])
         return self.time[there], self.channels[name][there]
+
+
+def with_channels(recording: Recording, channels: Mapping[str, Array]) -> Recording:
+    """The same stamps with other channels, 64-bit: what is checked of the stamps is not checked again."""
+    found = copy(recording)
+    object.__setattr__(found, "channels", channels)
+    return found

@@ -31,7 +31,7 @@ class Bogie:
     @property
     def part(self) -> str:
         """Name of its body."""
-        return f"bogie_{self.name}"
+        return body_of(self.name)
 
     @property
     def row(self) -> tuple[float, ...]:
@@ -40,6 +40,11 @@ class Bogie:
         along, about = damped(self.stiffness, self.body.mass), damped(self.bending, max(self.body.inertia))
         turns = (self.bending, 0.0, self.bending, about, self.damping, about)
         return (self.stiffness, along, *turns, -free, -swing, -free, free, swing, free, self.stop_stiffness)
+
+
+def body_of(bogie: str) -> str:
+    """Name of the body of a bogie's beam."""
+    return f"bogie_{bogie}"
 
 
 def damped(stiffness: float, inertia: float, share: float = 0.1) -> float:

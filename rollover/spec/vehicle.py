@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from ground.quantity import Label, Later, Quantity, parameters
-from rollover.spec.bogie import Bogie, check_bogies
+from rollover.spec.bogie import Bogie, body_of, check_bogies
 from rollover.spec.inertia import MassProperties, combined, cuboid
 from rollover.spec.occupant import Occupant, check_room
 from rollover.spec.provenance import Provenance
@@ -89,7 +89,7 @@ class Wheel:
     def hub(self) -> str:
         """Name of the body that it stands on: its carrier, a bogie's beam, or its own where it is sprung."""
         if self.bogie is not None:
-            return f"bogie_{self.bogie}"
+            return body_of(self.bogie)
         return self.carrier if self.suspension is None else f"hub_{self.name}"
 
 

@@ -12,6 +12,7 @@ from rollover.diagnosis.forward.instruments import Instruments
 from rollover.dynamics.drop_test import COLUMNS, DropModel, channels_of
 from rollover.recording import Recording
 from rollover.recording.filters import filtered, low_pass
+from rollover.recording.record import with_channels
 
 EVEN = np.arange(-200, 1500) * 2e-4
 STAMPS = {"even": EVEN, "too slow for the filter": EVEN[::5], "a gap": EVEN[(EVEN < 0.01) | (EVEN > 0.03)]}
@@ -40,7 +41,7 @@ def test_rows_too_slow_for_a_class_are_refused() -> None:
 
 def test_a_recording_that_shows_other_channels_keeps_its_stamps() -> None:
     before = Recording(title="r", time=EVEN, channels={"ground/sinkage": EVEN}, conditions={"gravity": 9.8})
-    found = before.showing({"ground/force_normal": 2.0 * EVEN})
+    found = with_channels(before, {"ground/force_normal": 2.0 * EVEN})
     assert found.time is before.time
     assert found.conditions == before.conditions
     assert list(found.channels) == ["ground/force_normal"]

@@ -94,7 +94,7 @@ class Simulations:
         raw = self.raw(r, *at, shift)
         if raw is None:
             return None
-        slope = self._time_derivative(r, *at, shift, raw)
+        slope = self.clock_slope(r, *at, shift, raw)
         return lambda end: self.moved(r, at, end, shift, slope)
 
     def predicted(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
@@ -161,7 +161,7 @@ class Simulations:
             found |= c.changes(x[own], 1 + ids[:k].count(c.id))
         return found
 
-    def _time_derivative(
+    def clock_slope(
         self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, raw: Array
     ) -> Array:
         """dy/dtau (n,) of recording r, SI, `raw` y there."""

@@ -104,8 +104,12 @@ class Problem(Blocks):
     @property
     def samples_per_draw(self) -> float:
         """Samples that share one error in all recordings: a rig repeats its discrepancy, (D21), (D27); runs scatter."""
-        others = sum(bool(e.discrepancy) for e in self.dataset[1:]) / (1.0 + self.dataset[0].taught_by)
-        return self.samples_per_error * (1.0 + others if self.samples_per_error > 1.0 else 1.0)
+        return self.samples_per_error * (self.recordings_per_draw if self.samples_per_error > 1.0 else 1.0)
+
+    @property
+    def recordings_per_draw(self) -> float:
+        """Recordings that share one draw of the discrepancy: all, as a rig repeats it, fewer where references teach."""
+        return 1.0 + sum(bool(e.discrepancy) for e in self.dataset[1:]) / (1.0 + self.dataset[0].taught_by)
 
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less predicted, stacked, SI, of each recording."""

@@ -85,7 +85,7 @@ class Blocks(Simulations):
         clock = clock and self.effort.is_timed and not (self._fixed_shifts and e.recording.clock.zero != "unknown")
         slope = np.zeros_like(raw)
         if clock:
-            slope = self._time_derivative(r, candidates, x, shift, raw)
+            slope = self.clock_slope(r, candidates, x, shift, raw)
 
         worth = e.worth(discontinuities)
         marginalised = e.marginalised_beside(discontinuities)

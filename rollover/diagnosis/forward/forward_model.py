@@ -19,6 +19,7 @@ from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import BESIDE, COLUMNS, DropFailedError, DropModel, Track, channels_of, unfit
 from rollover.effects import every, read
 from rollover.recording import Recording
+from rollover.recording.record import with_channels
 from rollover.scenario import Scenario, with_effects_at
 from rollover.spec.document import Itself, exchanged
 from rollover.spec.initiation import Drop
@@ -113,7 +114,7 @@ class DropSimulator:
     def _misread(self, physical: Exchanged, shift: float, sensors: Mapping[str, Any], drop: Array) -> dict[str, Array]:
         """Channels at the stamps as `sensors` read a drop."""
         channels = {**channels_of(drop, self.instruments.names), **self._edges(physical, shift, sensors)}
-        run = self._unread.showing(channels)
+        run = with_channels(self._unread, channels)
         channels = dict(read({n: e for n, e in sensors.items() if e.id not in EDGES}, run).channels)
         return filtered_like(channels, self.recording, self.rows)
 
