@@ -57,7 +57,7 @@ RATES = {"multiple_roll": 25.0, "side_overturn": 50.0, "cube_toss": 100.0, "rear
 
 @pytest.fixture(autouse=True)
 def _rated_sparsely(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A thousandth of a stretch is as far as notations are told apart; the warp costs the square of that."""
+    """A thousand samples tell notations apart as ten thousand do; the time warp costs the square of their number."""
     monkeypatch.setattr(rating, "MOST_SAMPLES", 1000)
 
 
