@@ -25,7 +25,7 @@ test: $(TESTED)
 
 # an environment without any optional package: what needs one says so in one line; its kernels are the same
 test-core: kernels
-	UV_PROJECT_ENVIRONMENT=$(CORE) $(UV) sync --locked --quiet --python $(PYTHON)
+	UV_PROJECT_ENVIRONMENT=$(CORE) $(UV) sync --locked --quiet --compile-bytecode --python $(PYTHON)
 	NUMBA_CACHE_DIR="$$(.venv/bin/python -c 'from ground.compiled import KEPT; print(KEPT)')" \
 	  $(CORE)/bin/pytest -q tests/core_only
 

@@ -49,7 +49,7 @@ class Origin:
 
 def origin(scenario: Scenario) -> Origin | None:
     """The shipped scenario with this title and what differs; None for a scenario with a title of its own."""
-    path = _files().get(scenario.title)
+    path = _file(scenario.title)
     if path is None:
         return None
     was, now = _leaves(_shipped(path)), _leaves(scenario)
@@ -110,10 +110,11 @@ def _shown(value: Any) -> str:
 
 
 @functools.cache
-def _files() -> Mapping[str, Path]:
-    """Title of each shipped scenario -> its file."""
+def _file(title: str) -> Path | None:
+    """The shipped scenario of a title; each says its own on one line, so that most files need not be parsed."""
     files = sorted(document.shipped_folder().glob("*.yaml"))
-    return {str(document.headings(path)["title"].plain): path for path in files}
+    able = (path for path in files if title in path.read_text(encoding="utf-8"))
+    return next((path for path in able if document.headings(path)["title"].plain == title), None)
 
 
 @functools.cache

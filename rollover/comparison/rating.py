@@ -129,7 +129,7 @@ def rate(
     span = float(np.ptp(m))
     weight = _weights(time, known)
     return Rating(
-        iso18571=iso18571(time, measured, simulated, least_rate=least_rate),
+        iso18571=iso18571(time, measured, simulated, least_rate=least_rate, most=MOST_SAMPLES),
         sprague_geers=sprague_geers(weight, m, s),
         samples=n,
         rms=rms,

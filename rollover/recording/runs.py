@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rollover.recording.record import CLASSES, Clock, Recording, Sensor
-from rollover.recording.tables import numbers, open_parquet
+from rollover.recording.tables import arrow_column, numbers, open_parquet
 from rollover.spec.channels import describe
 from rollover.system.arguments import is_finite_number
 from rollover.system.boundary import CURE, worded
@@ -51,7 +51,7 @@ def arrow_table(recording: Recording) -> Table:
         "notes": list(recording.notes),
     }
     schema = pa.schema(fields, metadata={"rollover": json.dumps(about)})
-    return pa.table([pa.array(values) for values in table.values()], schema=schema)
+    return pa.table([arrow_column(values) for values in table.values()], schema=schema)
 
 
 def data_frame(recording: Recording) -> DataFrame:

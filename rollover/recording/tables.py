@@ -210,12 +210,15 @@ def read_parquet_columns(path: Path, columns: Sequence[str]) -> dict[str, Array]
 def write_csv(columns: Mapping[str, Array], path: Path, head: str = "") -> None:
     """Write columns with every bit of every number; gaps are empty cells, `head` becomes comment lines."""
     import pyarrow as pa
-    import pyarrow.csv as pc
+    import pyarrow.compute as pc
+    from pyarrow import csv
 
     with path.open("wb") as file:
         file.writelines(f"# {line}".rstrip().encode() + b"\n" for line in head.splitlines())
-        table = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})
-        pc.write_csv(table, file, pc.WriteOptions(quoting_style="needed", quoting_header="needed"))
+        found = {name: arrow_column(values) for name, values in columns.items()}
+        gaps = {name: pa.nulls(len(values), pa.float64()) for name, values in found.items()}
+        table = pa.table({name: pc.if_else(pc.is_nan(values), gaps[name], values) for name, values in found.items()})
+        csv.write_csv(table, file, csv.WriteOptions(quoting_style="needed", quoting_header="needed"))
 
 
 def write_parquet_columns(columns: Mapping[str, Array], path: Path) -> None:
@@ -223,7 +226,15 @@ def write_parquet_columns(columns: Mapping[str, Array], path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    pq.write_table(pa.table({name: pa.array(values) for name, values in columns.items()}), path)
+    pq.write_table(pa.table({name: arrow_column(values) for name, values in columns.items()}), path)
+
+
+def arrow_column(values: Array) -> Any:
+    """Numbers (n,) as an array of Arrow, float64, NaN as they are; its own way there would import pandas for it."""
+    import pyarrow as pa
+
+    whole = np.ascontiguousarray(values, dtype=np.float64)
+    return pa.Array.from_buffers(pa.float64(), whole.size, [None, pa.py_buffer(whole)])
 
 
 def _numpy(table: Any, columns: Sequence[str]) -> dict[str, Array]:
@@ -243,7 +254,7 @@ def numbers(column: Any) -> Array:
 
     whole = column.cast(pa.float64(), safe=False)
     if whole.null_count:
-        whole = pc.fill_null(whole, pa.scalar(np.nan, pa.float64()))
+        whole = pc.fill_null(whole, arrow_column(np.array([np.nan]))[0])
     return np.concatenate([np.zeros(0), *(np.from_dlpack(chunk) for chunk in whole.chunks if len(chunk))])
 
 

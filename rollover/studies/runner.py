@@ -31,7 +31,7 @@ from rollover.studies.case_store import Row
 from rollover.studies.design import Points, points
 from rollover.studies.study import Study, base_values, changes
 from rollover.system.errors import InputError
-from rollover.system.processes import Failure, Outcome, map_cases
+from rollover.system.processes import Failure, Outcome, begin_server, map_cases
 
 TIME_LIMIT = 600.0  # s of wall time, for one case
 MEMORY_LIMIT = 4e9  # bytes that one case may take
@@ -198,11 +198,20 @@ def _outcomes(cases: Iterator[Case], way: Way, study: Study) -> Iterator[Outcome
         "memory_limit": way.memory_limit,
         "warm_up": partial(warm_up, study.simulator, study.scenario.of_many().integrator),
     }
+    if not way.scheduler and way.workers != 0 and (module := _warm(study)):
+        begin_server(module)
     if way.scheduler:
         from rollover.studies.cluster import map_on_cluster
 
         return map_on_cluster(work, cases, address=way.scheduler, workers=way.workers, **limits)
     return map_cases(work, cases, workers=way.workers, **limits)
+
+
+def _warm(study: Study) -> str:
+    """The module in which a study's kernels are loaded before its children are forked; Exudyn's are not."""
+    if study.simulator == "drop":
+        return "rollover.studies.warm_drops"
+    return "rollover.studies.warm_overturns" if study.scenario.of_many().integrator == "compiled" else ""
 
 
 def _keep(folder: Path, key: str, result: Result | None, failure: Failure | None, wall_time: float) -> Row:

@@ -13,7 +13,8 @@ import importlib.util
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
@@ -34,6 +35,16 @@ def named(kind: str) -> list[Path]:
     """The files of a kind that the environment names, each once."""
     names = filter(None, os.environ.get(KINDS[kind], "").split(os.pathsep))
     return list(dict.fromkeys(Path(name).resolve() for name in names))
+
+
+@contextmanager
+def none_named() -> Iterator[None]:
+    """Within it no file is named: what is imported before children are forked is the package's, as files may change."""
+    before = {name: os.environ.pop(name) for name in KINDS.values() if name in os.environ}
+    try:
+        yield
+    finally:
+        os.environ.update(before)
 
 
 def load(kind: str, examine: Callable[[ModuleType], str] = lambda module: "") -> None:

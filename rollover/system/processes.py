@@ -31,6 +31,7 @@ V = TypeVar("V")
 AHEAD = 2  # cases handed out per worker: none idles, and an interrupt has little to throw away
 LONGEST_PATH = 60  # of the folder of temporary files, bytes: that of a socket in it may have a hundred
 TASKS = 1000  # cases after which a worker is replaced, so that what a case leaks does not grow for ever
+OWN = __name__.partition(".")[0]  # only of this package it is known that a server may import it
 BROKEN = 3  # pools in a row that may break before a case has gone through
 KILLED = -9  # exit code of a process that was ended from outside, as the operating system does when memory runs out
 PROCESSOR_SPENT = -getattr(signal, "SIGXCPU", 1 << 30)  # exit code of a process whose time of the processor was up
@@ -91,6 +92,8 @@ def map_cases(
         raise ValueError(f"memory_limit: got {memory_limit!r}; more than 0 bytes")
     if workers == 0:
         return (_done(i, case, _guarded(function, case)) for i, case in enumerate(cases))
+    if children is None and function.__module__.partition(".")[0] == OWN:
+        begin_server(function.__module__)  # imported once, not by each child and whoever comes after one that crashed
     own = children or Children(workers, warm_up)
     return _in_children(function, cases, own, time_limit, memory_limit, keep=children is not None)
 

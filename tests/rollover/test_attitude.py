@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from rollover.calibration.calibrate import simulator
 from rollover.calibration.objective import Objective, case, parameter
+from rollover.comparison import rating
 from rollover.comparison.misfit import Misfit, estimated_noise, misfit, summary
 from rollover.comparison.run_pair import Result, difference, pair
 from rollover.comparison.synthesis import synthetic
@@ -52,6 +53,12 @@ SCENES: dict[str, tuple[str, dict[str, Any]]] = {
     "nose": ("cube_toss", NOSE),
 }
 RATES = {"multiple_roll": 25.0, "side_overturn": 50.0, "cube_toss": 100.0, "rear_overturn": 50.0, "nose": 100.0}
+
+
+@pytest.fixture(autouse=True)
+def _rated_sparsely(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thousand samples tell notations apart as ten thousand do; the time warp costs the square of their number."""
+    monkeypatch.setattr(rating, "MOST_SAMPLES", 1000)
 
 
 @cache

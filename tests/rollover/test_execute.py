@@ -16,8 +16,12 @@ from typing import Any
 
 import pytest
 
+from rollover import studies
+from rollover.studies import runner
 from rollover.system import own_code, processes
+from rollover.system.numbers import percent
 from rollover.system.processes import map_cases
+from tests.rollover.studies import drops
 
 
 def odd(case: Any) -> Any:
@@ -122,6 +126,47 @@ def test_children_have_what_their_server_imported_beside(tmp_path: Path, folder:
     env |= {"TMPDIR": str(tmp_path / folder)} if folder else {}
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=env, check=True)
     assert done.stdout.splitlines() == [f"{{'colorsys': {has}}}", "{'stringprep': False}", "[]"]
+
+
+def test_a_server_imports_what_is_the_packages_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody knows what a user's module does as it is imported; children that are given have begun as they were to."""
+    asked: list[str] = []
+    monkeypatch.setattr(processes, "begin_server", lambda *modules: asked.extend(modules))
+    map_cases(percent, [0.5], workers=1)
+    map_cases(odd, [2], workers=1)
+    map_cases(percent, [0.5], workers=0)
+    map_cases(percent, [0.5], children=processes.Children(1))
+    assert asked == ["rollover.system.numbers"]
+
+
+def test_kernels_of_a_study_are_there_before_its_children() -> None:
+    """And no file of one's own, which may be another one by the next study."""
+    code = (
+        "import rollover.studies.warm_drops as a\nfrom rollover.kernels import drop_integrator, time_loop\n"
+        "print(bool(drop_integrator.fall.signatures), bool(time_loop.advance.signatures))\n"
+        "import rollover.studies.warm_overturns as b\nprint(bool(time_loop.advance.signatures))\n"
+        "import os, sys\nprint(os.environ['ROLLOVER_EFFECTS'][-16:])\n"
+        "print(any(name.startswith('rollover_effects_') for name in sys.modules))\n"
+    )
+    own = {**os.environ, "ROLLOVER_EFFECTS": str(Path(__file__).with_name("faulty_effect.py"))}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=own)
+    assert done.stdout.split() == ["True", "False", "True", "faulty_effect.py", "False"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "module"),
+    [((), "warm_drops"), ((("simulator: drop\n", ""),), "warm_overturns")],
+)
+def test_a_study_asks_for_a_server_of_its_kernels(
+    changes: tuple[tuple[str, str], ...], module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr(runner, "begin_server", asked.append)
+    monkeypatch.setattr(runner, "map_cases", lambda *_, **more: iter(()))
+    study = studies.load(drops(tmp_path, *changes))
+    for workers in (0, 2):
+        assert list(runner._outcomes(iter(()), runner.Way(workers=workers), study)) == []
+    assert asked == [f"rollover.studies.{module}"]
 
 
 def warm() -> None:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rollover.assessment import results
@@ -34,17 +35,25 @@ def test_help_imports_nothing_heavy() -> None:
 
 
 def test_a_diagnosis_imports_nothing_it_does_not_need(tmp_path: Path) -> None:
-    """pyarrow's own way to NumPy imports pandas: a second for each process."""
+    """pyarrow's own ways to and from NumPy import pandas: a second for each process."""
     recording = run_of(load("drop_test")).recording
     runs.write_parquet(recording, tmp_path / "run.parquet")
     code = (
         "import sys, rollover.diagnosis.fit.warmup\nfrom pathlib import Path\n"
         "from rollover.recording.importers import read_recording\n"
+        "from rollover.recording import runs, tables\n"
         f"found = read_recording(Path({str(tmp_path / 'run.parquet')!r}))\n"
+        f"runs.write_parquet(found, Path({str(tmp_path / 'again.parquet')!r}))\n"
+        f"tables.write_parquet_columns(dict(found.channels), Path({str(tmp_path / 'columns.parquet')!r}))\n"
+        f"gaps, csv = found.time * float('nan'), Path({str(tmp_path / 'columns.csv')!r})\n"
+        "tables.write_csv({'gaps': gaps, **found.channels}, csv)\n"
+        "assert set(map(str, tables.read_csv(csv, ['gaps'])['gaps'])) == {'nan'}\n"
         "print(found.time.size, sorted({'exudyn', 'matplotlib', 'pandas', 'rerun', 'scipy.stats'} & set(sys.modules)))"
     )
     done = python(code)
     assert done.stdout.splitlines() == [f"{recording.time.size} []"], done.stderr
+    again = runs.read_parquet(tmp_path / "again.parquet")
+    assert all(np.array_equal(again[name], values, equal_nan=True) for name, values in recording.channels.items())
 
 
 def test_a_bug_shows_its_traceback_and_is_neither_of_the_answers() -> None:
