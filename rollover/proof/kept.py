@@ -84,8 +84,12 @@ class Kept:
         self.folder.chmod(0o700)
         shown = {"digest": seal.digest, "salt": seal.salt}
         text = json.dumps({"format": FORMAT, "asked": dict(self.asked), "seal": shown}, indent=1)
-        put(self.folder / CAMPAIGN, partial(_written, text))
-        (self.folder / CAMPAIGN).chmod(PRIVATE)
+        try:
+            put(self.folder / CAMPAIGN, partial(_written, text))
+            (self.folder / CAMPAIGN).chmod(PRIVATE)
+        except OSError:
+            self.clear()
+            raise
 
     def keep(self, case: str, answer: Answer) -> None:
         """Write what came of a case."""

@@ -75,6 +75,8 @@ def test_a_disk_that_is_full_from_any_write_on_is_one_line(
         assert all(any(word in line for word in PROGRESS) for line in before), f"{place}: {before}"
         assert "Results" not in result.stdout
         left = [p for p in out.rglob("*") if p.name.startswith(".")] if out.exists() else []
+        if name == "prove":  # which keeps a campaign that has begun, to go on
+            left = [p for p in left if p.name != ".a.cases" or not (p / "campaign.json").stat().st_size]
         assert left == [], f"{place}: {left}"
         if name != "study":  # which keeps its finished cases, to go on
             assert not target.exists() or (target.is_dir() and list(target.iterdir()) == []), place
