@@ -15,6 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from viz.figures import plots
+from viz.figures.corner import corner
 from viz.figures.heat_map import DARK, DEEP, INK, PAPER, WHITE, heat_map
 from viz.figures.plots import COLOURS, Curve, Level, Outline, View, thinned
 from viz.figures.reading import MOST_POINTS
@@ -176,6 +177,21 @@ def test_what_is_read_in_a_figure_keeps_its_digits() -> None:
     grid = [np.repeat(levels[0], 2), np.tile(levels[1], 2)]
     drawn = heat_map(*grid, np.arange(4.0), across="gap, m", up="speed, m/s", label="kN")
     assert {"0.0125", "0.0375", "1.125", "2.375"} <= set(re.findall(r"<text[^>]*>([^<]*)</text>", drawn))
+
+
+def test_the_bar_of_a_map_has_the_colours_of_its_cells() -> None:
+    """Its pieces are thinner than a pixel: without a stroke of their own the page would show between them."""
+    values = np.linspace(0.0, 9.0, 10)
+    drawn = heat_map(values, np.zeros(10), values, across="a", up="b", label="c")
+    pieces = re.findall(r'style="fill: (#\w+)(?:; stroke: (#\w+))?[^"]*"/>', drawn[drawn.rindex("QuadMesh") :])
+    assert len(pieces) > 200
+    assert all(fill == stroke for fill, stroke in pieces)
+
+
+def test_numbers_on_an_axis_are_whole() -> None:
+    values = 1.0 + 1e-4 * np.random.default_rng(1).standard_normal((500, 2))
+    drawn = corner(["a", "b"], values, [1.0, 1.0])
+    assert not [t for t in re.findall(r"<text[^>]*>([^<]*)</text>", drawn) if t.startswith("+")]
 
 
 def test_numbers_on_a_map_are_read_on_their_cells() -> None:

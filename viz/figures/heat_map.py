@@ -66,6 +66,7 @@ def heat_map(
         bar.set_label(label, color=COLOURS["ink"])
         bar.outline.set_visible(False)
         bar.solids.set_rasterized(False)  # as shapes: the page allows no images within pictures
+        bar.solids.set_edgecolor("face")  # without which the page shows through the seams, and colours are paler
         finish(axes, across, up, margins=(0.0, 0.0))
         axes.grid(visible=False)
     return svg.text

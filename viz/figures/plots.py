@@ -383,6 +383,7 @@ def canvas(
 
     ours = {"font.size": 9.0, "svg.hashsalt": "rollover", "svg.fonttype": "none", "path.simplify": False}
     ours["text.parse_math"] = False  # a name from data is no formula
+    ours["axes.formatter.useoffset"] = False  # no "+1" beside an axis to be added to its numbers
     inked = dict.fromkeys(("text.color", "axes.labelcolor", "xtick.labelcolor", "ytick.labelcolor"), COLOURS["ink"])
     with mpl.rc_context({**mpl.rcParamsDefault, **ours, **inked}):  # whatever the user's own file says
         figure, svg = Figure(figsize=(width, height), layout=layout), _Svg()
