@@ -12,7 +12,7 @@ from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
-from rollover.diagnosis.inference.slow_discrepancy import gain, gram, shown_beside
+from rollover.diagnosis.inference.slow_discrepancy import gram, left_by, shown_beside
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
@@ -83,7 +83,7 @@ def test_a_slow_wave_alone_shows_no_effect(seed: int) -> None:
 def test_what_the_model_misses_is_no_sensor() -> None:
     problem = judged(curved(0.02, 5, changes={"effects.soil-stiffness.scale": 1.3}), SCALE, MEMORY)
     base, fits = fits_beside(problem)
-    gains = {f.label: gain(problem, base, f) for f in fits}
+    gains = {f.label: left_by(problem, base) - left_by(problem, f) for f in fits}
     assert max(gains, key=lambda label: gains[label]) == "soil-stiffness"
     assert gains["soil-stiffness"] > 100.0
     assert shown_beside(problem, base, fits, 40) is None

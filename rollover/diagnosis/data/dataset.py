@@ -134,14 +134,20 @@ class Dataset:
     @cached_property
     def uncertain(self) -> Array:
         """What one standard deviation of each uncertain condition, then of each zero, does whitened, (n, q)."""
+        columns = self.uncertain_columns
+        if not columns:
+            return np.zeros((self.count, 0))
+        return np.stack([self.whitened(column) for column in columns], axis=1)
+
+    @property
+    def uncertain_columns(self) -> list[Array]:
+        """The same in SI, (n,) each."""
         columns = [] if self.nuisance is None else list(self.nuisance.T)
         for s, part in self.spans():
             if s.zero_error > 0.0:
                 columns.append(np.zeros(self.count))
                 columns[-1][part] = s.zero_error
-        if not columns:
-            return np.zeros((self.count, 0))
-        return np.stack([self.whitened(column) for column in columns], axis=1)
+        return columns
 
     @cached_property
     def expected(self) -> float | None:

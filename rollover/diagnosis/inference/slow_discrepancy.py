@@ -40,21 +40,21 @@ def shown_beside(problem: Problem, base: Fitted, fits: Sequence[Fitted], candida
     able = [f for f in fits if not is_at_bound(f)]
     if not able:
         return None
-    gains = [gain(problem, base, f) for f in able]
-    draws = problem.recordings_per_draw
-    p = [candidates * float(chi2.sf(max(q, 0.0) / draws, len(f.own))) for q, f in zip(gains, able, strict=True)]
-    best = int(np.argmax(gains))
-    is_shown = able[best].candidates[-1].kind == "sensor" and p[best] < SETTINGS.inference.lack_of_fit.p_value
-    return able[best] if is_shown else None
+    left = [left_by(problem, f) for f in able]
+    best = int(np.argmin(left))
+    if able[best].candidates[-1].kind != "sensor":
+        return None
+    gain = max(left_by(problem, base) - left[best], 0.0)
+    p_value = candidates * float(chi2.sf(gain / problem.recordings_per_draw, len(able[best].own)))
+    return able[best] if p_value < SETTINGS.inference.lack_of_fit.p_value else None
 
 
-def gain(problem: Problem, base: Fitted, fitted: Fitted) -> float:
-    """Squares m'S^-1 m that a fit leaves less than a base, over all recordings, each at its own clock.
+def left_by(problem: Problem, fitted: Fitted) -> float:
+    """Squares m'S^-1 m that a fit leaves of all recordings, each at its own clock.
 
     Time shifts, uncertain conditions and zeros are marginalised.
     """
-    left = [[_left(problem, r, f, b.shift) for r, b in enumerate(f.blocks)] for f in (base, fitted)]
-    return float(sum(before - after for before, after in zip(*left, strict=True)))
+    return float(sum(_left(problem, r, fitted, b.shift) for r, b in enumerate(fitted.blocks)))
 
 
 def _left(problem: Problem, r: int, fitted: Fitted, shift: float) -> float:
@@ -62,22 +62,12 @@ def _left(problem: Problem, r: int, fitted: Fitted, shift: float) -> float:
     if raw is None:
         return np.inf
     later = problem.clock_slope(r, fitted.candidates, fitted.x, shift, raw) * e.shift_prior
-    G = gram(e, np.stack([e.values - raw, later, *_uncertain(e)], axis=1), e.simulator.contact + shift)
+    G = gram(e, np.stack([e.values - raw, later, *e.uncertain_columns], axis=1), e.simulator.contact + shift)
     # the shift's prior is about zero: (tau + dtau)^2/sd^2
     held, target = G[1:, 1:] + np.eye(G.shape[0] - 1), G[1:, 0].copy()
     at = shift / e.shift_prior
     target[0] -= at
     return float(G[0, 0] + at**2 - target @ np.linalg.solve(held, target))
-
-
-def _uncertain(e: Dataset) -> list[Array]:
-    """One standard deviation of each uncertain condition and zero, SI, stacked."""
-    columns = [] if e.nuisance is None else list(e.nuisance.T)
-    for s, part in e.spans():
-        if s.zero_error > 0.0:
-            columns.append(np.zeros(e.count))
-            columns[-1][part] = s.zero_error
-    return columns
 
 
 def gram(e: Dataset, columns: Array, contact: float) -> Array:
@@ -94,55 +84,38 @@ def gram(e: Dataset, columns: Array, contact: float) -> Array:
 
 def _gram_of(e: Dataset, s: Signal, X: Array, contact: float) -> Array:
     from scipy.linalg import solveh_banded
+    from scipy.sparse import diags_array
 
-    time, level = e.recording.time[s.rows], s.heteroscedasticity * np.ones(s.rows.size)
+    time = e.recording.time[s.rows]
     noise, ar = s.quiet
-    noise = float(np.hypot(noise, e.model_error * s.span))
-    c = grown(ar) * np.array([1.0, *(-a for a in ar)])  # of unit innovations, where a sample has the stated noise
-    scaled = X / (noise * level)[:, None]
-    white = sum(ck * _delayed(scaled, k) for k, ck in enumerate(c))
-    G = white.T @ white
+    own = 1.0 / (np.hypot(noise, e.model_error * s.span) * s.heteroscedasticity * np.ones(time.size))
+    # the filter to innovations of variance 1, where a sample has the stated noise
+    c = grown(ar) * np.array([1.0, *(-a for a in ar)])
+    W = diags_array(c, offsets=-np.arange(c.size), shape=(time.size, time.size)) @ diags_array(own)
+    N = (W.T @ W).tocsr()  # N^-1
+    back = N @ X
+    G = X.T @ back
     late = time >= contact
-    g, t_c = e.discrepancy.get(s.channel, 0.0) * s.span, e.memory[s.channel]
-    n = int(late.sum())
-    if g <= 0.0 or n < 2:
+    g, t_c = e.discrepancy[s.channel] * s.span, e.memory[s.channel]
+    if g <= 0.0 or np.count_nonzero(late) < 2:
         return np.asarray(G)
-    # N^-1 X, and the bands of E'N^-1 E: those of C'C, C the filter
-    back = sum(ck * _advanced(white, k) for k, ck in enumerate(c)) / (noise * level)[:, None]
-    width = max(len(ar), 1)
-    bands = np.zeros((width + 1, n))
-    own = 1.0 / (noise * level)
-    size = own.size
-    for lag in range(len(ar) + 1):
-        # (C'C)_i,i+lag = sum_j c_j c_j-lag over rows i+j within the signal
-        i = np.arange(size - lag)
-        total = sum(c[j] * c[j - lag] * (i + j < size) for j in range(lag, len(c)))
-        value = np.zeros(size)
-        value[lag:] = total * own[: size - lag] * own[lag:]
-        bands[width - lag] += value[late]
-    _add_precision(bands, width, time[late], g, t_c)
-    there = back[late]
-    return np.asarray(G - there.T @ solveh_banded(bands, there))
+    bands = _precision(time[late], g, t_c, max(len(ar), 1))
+    inside = N[late][:, late]
+    for lag in range(c.size):
+        bands[-1 - lag, lag:] += inside.diagonal(lag)
+    return np.asarray(G - back[late].T @ solveh_banded(bands, back[late]))
 
 
-def _add_precision(bands: Array, width: int, time: Array, g: float, t_c: float) -> None:
-    """K^-1/g^2 of the Ornstein-Uhlenbeck process at rising times: tridiagonal, into upper bands."""
+def _precision(time: Array, g: float, t_c: float, width: int) -> Array:
+    """K^-1/g^2 of the Ornstein-Uhlenbeck process at rising times (n,): tridiagonal, as upper bands (width + 1, n)."""
     rho = np.exp(-np.diff(time) / t_c)
     free = 1.0 / (1.0 - rho**2)
-    bands[width, 1:] += free / g**2
-    bands[width, :-1] += rho**2 * free / g**2
-    bands[width, 0] += 1.0 / g**2
-    bands[width - 1, 1:] -= rho * free / g**2
-
-
-def _delayed(X: Array, k: int) -> Array:
-    """Rows k later, zeros before: x_i-k."""
-    return X if k == 0 else np.concatenate([np.zeros((k, X.shape[1])), X[:-k]])
-
-
-def _advanced(X: Array, k: int) -> Array:
-    """Rows k earlier, zeros after: x_i+k."""
-    return X if k == 0 else np.concatenate([X[k:], np.zeros((k, X.shape[1]))])
+    bands = np.zeros((width + 1, time.size))
+    bands[-1, 1:] += free
+    bands[-1, :-1] += rho**2 * free
+    bands[-1, 0] += 1.0
+    bands[-2, 1:] -= rho * free
+    return bands / g**2
 
 
 def _is_known(e: Dataset, s: Signal) -> bool:
