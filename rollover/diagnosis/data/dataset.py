@@ -134,20 +134,15 @@ class Dataset:
     @cached_property
     def uncertain(self) -> Array:
         """What one standard deviation of each uncertain condition, then of each zero, does whitened, (n, q)."""
-        columns = self.uncertain_columns
-        if not columns:
-            return np.zeros((self.count, 0))
-        return np.stack([self.whitened(column) for column in columns], axis=1)
+        columns = [self.whitened(column) for column in self.uncertain_columns]
+        return np.stack(columns, axis=1) if columns else np.zeros((self.count, 0))
 
     @property
     def uncertain_columns(self) -> list[Array]:
         """The same in SI, (n,) each."""
-        columns = [] if self.nuisance is None else list(self.nuisance.T)
-        for s, part in self.spans():
-            if s.zero_error > 0.0:
-                columns.append(np.zeros(self.count))
-                columns[-1][part] = s.zero_error
-        return columns
+        zeros, rows = [(s.zero_error, part) for s, part in self.spans() if s.zero_error > 0.0], np.arange(self.count)
+        offsets = [np.where((rows >= part.start) & (rows < part.stop), error, 0.0) for error, part in zeros]
+        return [*([] if self.nuisance is None else self.nuisance.T), *offsets]
 
     @cached_property
     def expected(self) -> float | None:
