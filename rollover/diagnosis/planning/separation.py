@@ -62,7 +62,7 @@ class Tests:
         self.problem = Problem(self.dataset)
         self._moved: dict[tuple[str, tuple[float, ...]], Array | None] = {}
         self._phases: dict[tuple[int, str, tuple[float, ...]], tuple[Problem, Fitted] | None] = {}
-        self._shown: dict[tuple[str, tuple[float, ...]], tuple[Problem, float] | None] = {}
+        self._shown: dict[tuple[str, tuple[float, ...]], float | None] = {}
 
     @cached_property
     def _base(self) -> Fitted:
@@ -88,34 +88,33 @@ class Tests:
             )
         return self._moved[key]
 
-    def recorded(self, c: Candidate, x: tuple[float, ...]) -> tuple[Problem, float] | None:
-        """The recordings as they would be with an effect and without noise, and what nothing leaves of it there.
+    def _without_noise(self, c: Candidate, x: tuple[float, ...], shifts: Sequence[float]) -> Problem | None:
+        """The recordings as they would be with an effect and so late; None if it cannot be simulated."""
+        raws = [self.problem.predicted_with_jumps(r, (c,), x, shift) for r, shift in enumerate(shifts)]
+        made = [showing(e, raw) for e, raw in zip(self.dataset, raws, strict=True) if raw is not None]
+        return Problem(made) if len(made) == len(raws) else None
 
-        None if it cannot be simulated.
-        """
+    def _left_by_nothing(self, c: Candidate, x: tuple[float, ...]) -> float | None:
+        """What nothing leaves of an effect's recordings without noise; None if they cannot be simulated."""
         key = (c.key, x)
         if key not in self._shown:
-            raws = [self.problem.predicted_with_jumps(r, (c,), x, 0.0) for r in range(len(self.dataset))]
-            made = [showing(e, raw) for e, raw in zip(self.dataset, raws, strict=True) if raw is not None]
-            problem = Problem(made)
-            unfitted = problem.fit((), (), rounds=TUNING.rounds) if len(made) == len(raws) else None
-            self._shown[key] = None if unfitted is None else (problem, unfitted.total)
+            problem = self._without_noise(c, x, [0.0] * len(self.dataset))
+            unfitted = None if problem is None else problem.fit((), (), rounds=TUNING.rounds)
+            self._shown[key] = None if unfitted is None else unfitted.total
         return self._shown[key]
 
     def unexplained(self, c: Candidate, x: tuple[float, ...]) -> float:
         """Noncentrality of an effect beside nothing but clocks, gains and uncertain values; 0 if it cannot be made."""
-        recorded = self.recorded(c, x)
-        return 0.0 if recorded is None else recorded[1]
+        return self._left_by_nothing(c, x) or 0.0
 
     def apart(self, c: Candidate, x: tuple[float, ...], rival: Candidate) -> Apart | None:
         """An effect at x through a rival that is refitted; None where the effect cannot be simulated.
 
         Secants from nothing say where the rival's fits begin, and are the answer where these are beyond doubt.
         """
-        found = self.recorded(c, x)
-        if found is None:
+        far = self._left_by_nothing(c, x)
+        if far is None:
             return None
-        far = found[1]
         nearest = self._nearest(c, x, rival)
         if not nearest or nearest[0][0] > TUNING.certain_noncentrality:
             least = min([far, *(chi2 for chi2, _ in nearest)])
@@ -134,19 +133,17 @@ class Tests:
         return Apart(noncentrality=noncentrality, probability=probability, x=each[0].x)
 
     def recorded_at(self, phase: int, c: Candidate, x: tuple[float, ...]) -> tuple[Problem, Fitted] | None:
-        """`recorded` where jumps fall elsewhere within a sampling step, and the effect's own fit; each as its own."""
+        """Recordings whose jumps fall elsewhere within a sampling step, each elsewhere, and the effect's own fit."""
         key = (phase, c.key, x)
         if key not in self._phases:
-            many = len(self.dataset)
             steps = [float(np.median(np.diff(e.recording.time))) for e in self.dataset]
-            late = [((phase + r) % TUNING.phases + 0.5) / TUNING.phases - 0.5 for r in range(many)]
+            late = [((phase + r) % TUNING.phases + 0.5) / TUNING.phases - 0.5 for r in range(len(steps))]
             shifts = [f * step for f, step in zip(late, steps, strict=True)]
-            raws = [self.problem.predicted_with_jumps(r, (c,), x, s) for r, s in enumerate(shifts)]
-            made = [showing(e, raw) for e, raw in zip(self.dataset, raws, strict=True) if raw is not None]
-            problem = Problem(made)
-            problem.shifts = shifts
-            own = problem.fit((c,), x, rounds=TUNING.rounds, finely=True) if len(made) == many else None
-            self._phases[key] = None if own is None else (problem, own)
+            self._phases[key] = None
+            if (problem := self._without_noise(c, x, shifts)) is not None:
+                problem.shifts = shifts
+                own = problem.fit((c,), x, rounds=TUNING.rounds, finely=True)
+                self._phases[key] = None if own is None else (problem, own)
         return self._phases[key]
 
     def _apart_at(
