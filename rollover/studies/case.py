@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import gc
 import hashlib
 import math
 import os
@@ -11,6 +12,7 @@ import platform
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -109,6 +111,14 @@ def warm_up(simulator: Simulator = "full", integrator: str = "exudyn") -> None:
         _dropped(drop)
     else:
         _simulated(drop.replaced({"simulation.duration": 0.005, "simulation.integrator": integrator}), clearance=False)
+
+
+def warm_up_before_fork(simulator: Simulator = "full", integrator: str = "exudyn") -> None:
+    """`warm_up` in the process that children are forked from, without any file of one's own, which may change."""
+    with suppress(Exception), own_code.none_named():  # the first case will say what is wrong
+        warm_up(simulator, integrator)
+    gc.collect()
+    gc.freeze()  # what stays for good is not searched again and again by each child
 
 
 class WrongVersionsError(Exception):

@@ -1,12 +1,5 @@
 """What children need for overturns by the compiled loop, imported and called once, for `processes.begin_server`."""
 
-import gc
-from contextlib import suppress
+from rollover.studies.case import warm_up_before_fork
 
-from rollover.studies.case import warm_up
-from rollover.system import own_code
-
-with suppress(Exception), own_code.none_named():  # the first case will say what is wrong
-    warm_up("full", "compiled")
-gc.collect()
-gc.freeze()  # what stays for good is not searched again and again by each child
+warm_up_before_fork("full", "compiled")
