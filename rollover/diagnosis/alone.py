@@ -83,13 +83,14 @@ def best_predictor(problem: Problem, one: Step, groups: Groups) -> Fitted:
     """
     able = [one.fitted, *(f for f in one.rivals if not is_at_bound(f) and f is not one.fitted)]
     ahead = min(able, key=lambda f: held_out(f, groups).chi2.sum())
-
-    def is_behind(f: Fitted) -> bool:
-        more = share_beyond(problem, one.base, f, ahead, groups)
-        return more is not None and more.low > 0.0
-
-    level = [f for f in able if f is ahead or not is_behind(f)]
+    level = [f for f in able if f is ahead or not is_behind(problem, one, f, ahead, groups)]
     return max(level, key=lambda f: log_evidence(problem, f))
+
+
+def is_behind(problem: Problem, one: Step, rival: Fitted, ahead: Fitted, groups: Groups) -> bool:
+    """Whether a fit surely predicts more of conditions held out than a rival does."""
+    more = share_beyond(problem, one.base, rival, ahead, groups)
+    return more is not None and more.low > 0.0
 
 
 def verdict_on_single_effect(
@@ -173,7 +174,8 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
     That was estimated from what the best leaves, whose form need not be the right one: a rival that explains nearly all
     that the best does is not excluded where it leaves no more than the discrepancy, or is of the same family. Nor is
     one of those that hold the right one with 95 % by what they leave, (D24), if it explains half as much, or is of the
-    same family. What becomes the best at an end of its range, as a layer a stiffness, is no rival.
+    same family, unless the best surely predicts more. What becomes the best at an end of its range, as a layer a
+    stiffness, is no rival.
     """
     near = confusion_set(one, groups, problem.samples_per_error, is_refuted=True)
     best, most = one.fitted, held_out_gain(one, one.fitted, groups)
@@ -183,6 +185,7 @@ def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
             continue
         explains_half = held_out_gain(one, rival, groups) > TUNING.half_share * most
         is_probable = any(rival is f for f in probable) and (is_same_family(rival, best) or explains_half)
+        is_probable = is_probable and not is_behind(problem, one, rival, best, groups)
         if is_probable or (is_tolerated(problem, rival) and explains_nearly_all(one, rival, groups)):
             near.append(rival)
     return near

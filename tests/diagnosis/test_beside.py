@@ -220,11 +220,17 @@ def test_rivals_of_a_family_or_within_the_discrepancy_stay(monkeypatch: pytest.M
     # and what may as well be the right one by what it leaves, if it explains half as much as the best
     with monkeypatch.context() as patch:
         patch.setattr(alone, "credible", lambda _, fits: list(fits))
-        offered = [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)]
-        assert offered == ["soil-layer", *rivals]
-        half = [fitted("guide-friction", (51.0,) * DROPS), fitted("soil-crust", (51.0,) * DROPS)]
+        level = [fitted("soil-viscous-damping", (0.2, 9.0) * 3), fitted("guide-friction", (0.2, 80.0) * 3)]
+        likely = explanation((100.0,) * DROPS, best, *level).parts[0]  # some conditions are predicted better by these
+        offered = [f.candidates[-1].id for f in alike_beside(PROBLEM, likely, GROUPS)]
+        assert offered == ["soil-layer", "soil-viscous-damping", "guide-friction"]
+        half = [fitted("guide-friction", (0.2, 101.8) * 3), fitted("soil-crust", (0.2, 101.8) * 3)]
         less = explanation((100.0,) * DROPS, best, *half).parts[0]  # its kin are offered all the same
         assert [f.candidates[-1].id for f in alike_beside(PROBLEM, less, GROUPS)] == ["soil-layer", "soil-crust"]
+        # not what the best surely predicts more than, kin or not, unless it explains nearly all
+        behind = [fitted(id, (40.0, 41.0) * 3) for id in ("guide-friction", "soil-crust")]
+        sure = explanation((100.0,) * DROPS, best, *behind, fits[1]).parts[0]
+        assert [f.candidates[-1].id for f in alike_beside(PROBLEM, sure, GROUPS)] == ["soil-layer", "soil-stiffness"]
     # one that becomes the best at the end of its range is the best itself
     ends = [fitted(id, (0.6,) * DROPS, numbers=2, x=1.0) for id in ("soil-crust", "soil-rate-hardening")]
     step = explanation((100.0,) * DROPS, fitted("soil-stiffness", (0.5,) * DROPS), *ends).parts[0]
