@@ -174,8 +174,21 @@ def _begun(order: Order) -> tuple[np.random.Generator, Campaign]:
     return random, campaign.draw(random, needs, hard=order.kind == "decoy")
 
 
-def make(order: Order) -> Case:
-    """Make one case: the same for the same order, to the last bit."""
+@dataclass(frozen=True, kw_only=True)
+class Drawn:
+    """What is drawn of a case before anything is measured: the tests, and what is in them that a diagnosis may find.
+
+    `plain` are the drops with nothing in them.
+    """
+
+    random: np.random.Generator
+    campaign: Campaign
+    changes: tuple[Change, ...]
+    plain: tuple[Descent, ...]
+
+
+def drawn(order: Order) -> Drawn:
+    """Draw a case, but for its background and noise: the same for the same order, to the last bit."""
     random, held = _begun(order)
     rebounds = order.kind != "negligible" and (order.ids == ("soil-adhesion",) or random.random() < 0.04)
     rebounds = rebounds and "soil-elastic-rebound" not in order.ids
@@ -185,9 +198,16 @@ def make(order: Order) -> Case:
         held = replace(
             held, shots=tuple(replace(s, scatter=float(np.exp(random.normal(0, spread)))) for s in held.shots)
         )
-    plain = [descend(rig_of(held, shot, ()), *span(shot)) for shot in held.shots]
+    plain = tuple(descend(rig_of(held, shot, ()), *span(shot)) for shot in held.shots)
     setting = _setting(held, plain, order.kind == "other-form")
     changes = tuple(_drawn(random, order, id, setting) for id in order.ids)
+    return Drawn(random=random, campaign=held, changes=changes, plain=plain)
+
+
+def make(order: Order) -> Case:
+    """Make one case: the same for the same order, to the last bit."""
+    case = drawn(order)
+    random, held, changes, plain = case.random, case.campaign, case.changes, case.plain
     around = None
     if order.background:
         rigs = [rig_of(held, shot, ()) for shot in held.shots]
