@@ -82,7 +82,8 @@ def determine(objective: Objective, u: Array) -> Determination:
     worth = _independent(objective)
     # r are scaled so that correlated samples count once: their squares sum to the number of independent ones
     widening = max(1.0, float(r @ r) / max(worth - len(u), 1.0)) if samples else 1.0
-    _, singular, directions = np.linalg.svd(J, full_matrices=True)
+    # all directions of the parameters, none of the samples: that matrix would be as large as their square
+    _, singular, directions = np.linalg.svd(np.linalg.qr(J, mode="r"), full_matrices=True)
     singular = np.concatenate([singular, np.zeros(len(u) - singular.size)])
     spread = np.sqrt(widening / (singular**2 + widening / FLAT**2))
     covariance = directions.T @ np.diag(spread**2) @ directions

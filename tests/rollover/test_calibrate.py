@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -150,6 +151,23 @@ def test_intervals_of_a_straight_line_are_the_textbook_ones() -> None:
         )
         assert profile.rises == pytest.approx(((profile.places - 0.5) * Z95 / width) ** 2, rel=5e-3, abs=1e-6)
         assert profile.sigma == pytest.approx(width / Z95, rel=1e-3)
+
+
+def test_memory_grows_with_the_samples_not_their_square() -> None:
+    """A hundred numbers for each of 8,001 samples are 6 MB, one for each pair of them 512 MB."""
+    t = np.linspace(0.0, 1.0, 8001)
+
+    def long(scenario: Scenario) -> Recording:
+        force = scenario.vehicle.mass + 1000.0 * t * scenario.initiation.speed
+        return Recording(title="long", time=t, channels={FORCE: force})
+
+    mass = Parameter(path="vehicle.mass", start=132.0, low=122.0, high=142.0)
+    objective = _of(long, long(scene())[FORCE] + np.random.default_rng(3).normal(size=t.size), 1.0, mass)
+    tracemalloc.start()
+    determine(objective, np.array([0.5]))
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 100 * 8 * t.size
 
 
 def test_residuals_beyond_the_noise_widen_the_intervals() -> None:
