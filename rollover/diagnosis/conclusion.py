@@ -72,6 +72,7 @@ class Asked:
     estimates: bool = False  # whether a model error is estimated, and answers that it makes doubtful are refused
     draws: int = 0  # of the numbers of what is named
     is_timed: bool = False  # whether clocks were set right that are off by far more than they may be
+    known: tuple[Fitted, ...] = ()  # fits of single effects to the same recordings under another noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +151,13 @@ def concluded(
     acts = "rollover" if any(map(unfit, set_ups)) else "drop"
     candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_ups[0]))
     inquiry = Inquiry(
-        problem=problem, candidates=candidates, groups=groups, phases=phases, say=asked.say, executor=executor
+        problem=problem,
+        candidates=candidates,
+        groups=groups,
+        phases=phases,
+        say=asked.say,
+        executor=executor,
+        known=asked.known,
     )
     return conclusion_of(
         asked,

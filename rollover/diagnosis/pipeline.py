@@ -206,6 +206,7 @@ def _beside_estimated_discrepancy(
     several = [tried.fitted] if len(tried.fitted.candidates) > 1 else []
     learned = estimated(found.problem, tried.base, [*_rivals(tried), *several]).at_most(asked.bounds)
     asked.say("a model is never exact: again beside a discrepancy of the size that explanations leave")
+    asked = replace(asked, known=_rivals(tried))  # a minimum that was found stays found
     other = concluded(
         replace(asked, discrepancy=learned), with_discrepancy(every, learned), found.inconsistencies, notes
     )
@@ -213,7 +214,7 @@ def _beside_estimated_discrepancy(
         # fits held against noise alone are bent to what they cannot meet, and leave more than others would
         again = estimated(other.problem, other.tried.base, _rivals(other.tried)).at_most(asked.bounds)
         if learned.is_clearly_above(again):
-            learned = again
+            learned, asked = again, replace(asked, known=_rivals(other.tried))
             other = concluded(
                 replace(asked, discrepancy=learned), with_discrepancy(every, learned), found.inconsistencies, notes
             )

@@ -20,7 +20,7 @@ from rollover.diagnosis.fit.time_shift import estimate_time_shifts
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.forward_step import _restarted_from_base
-from rollover.diagnosis.selection.restarts import from_other_starts, with_common_time_shifts
+from rollover.diagnosis.selection.restarts import from_other_starts, with_common_time_shifts, with_known_minima
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far, screen
 from rollover.diagnosis.settings import SETTINGS
@@ -172,3 +172,36 @@ def test_a_misled_fit_restarts_and_goes_on_if_it_gains() -> None:
     found = _restarted_from_base(inquiry, base, [fitted("slope", 200.0, (0.5, 0.2)), *astray], scored)
     assert [(f.candidates[-1].id, f.chi2) for f in found] == [("inertia", 250.0), ("air-drag", 310.0)]
     assert [j.start for j in asked] == [(0.5, 0.7), (0.5, 0.8), (0.5, 0.7)]
+
+
+def test_a_minimum_that_another_noise_led_to_is_kept() -> None:
+    """Of 900 that the base leaves: crust 700 here and 90 from the other place, layer 400 here and no less from there.
+
+    What was not fitted here is fitted if it leaves less than 1.5 times the best.
+    """
+    left = {"soil-crust": 90.0, "soil-layer": 500.0, "guide-friction": 120.0, "impact-speed": 650.0, "mass": 10.0}
+
+    def fitted(id: str, chi2: float, x: float, *beside: Candidate) -> Fitted:
+        w = np.full(400, np.sqrt(chi2 / 400.0))
+        block = ResidualBlock(residual=w, J=np.zeros((400, 1)), slope=np.zeros(400), shift=0.0, prior=1.0)
+        return Fitted(candidates=(*beside, replace(PLAIN, id=id)), x=(x,), blocks=(block,))
+
+    asked: list[Task] = []
+
+    def fits(tasks: list[Task]) -> list[Fitted]:
+        asked.extend(tasks)
+        return [fitted(j.candidates[-1].id, left[j.candidates[-1].id], j.start[-1]) for j in tasks]
+
+    base = replace(fitted("mass", 900.0, 0.5), candidates=(), x=())
+    here = [fitted("soil-layer", 400.0, 0.2), fitted("soil-crust", 700.0, 0.2)]
+    known = [fitted(id, 1.0, 0.7) for id in ("soil-crust", "soil-layer", "guide-friction", "impact-speed")]
+    known += [fitted("mass", 1.0, 0.7, PLAIN), fitted("soil-stiffness", 1.0, 0.7)]  # beside another, and not looked for
+    free = [replace(PLAIN, id=id) for id in left]
+    inquiry = cast(Inquiry, SimpleNamespace(known=known, fits=fits, free=lambda _: free))
+    found = with_known_minima(inquiry, base, here)
+    assert [(f.candidates[-1].id, round(f.chi2, 6), f.x) for f in found] == [
+        ("soil-crust", 90.0, (0.7,)),
+        ("guide-friction", 120.0, (0.7,)),
+        ("soil-layer", 400.0, (0.2,)),
+    ]
+    assert [(j.candidates[-1].id, j.start) for j in asked] == [(f.candidates[-1].id, (0.7,)) for f in known[:4]]

@@ -85,7 +85,10 @@ class TaskRunner(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Inquiry:
-    """What every step of a selection is made with: problem, candidates, groups held out in turn, and the executor."""
+    """What every step of a selection is made with: problem, candidates, groups held out in turn, and the executor.
+
+    `known` are fits of single effects under another noise.
+    """
 
     problem: Problem
     candidates: Sequence[Candidate]
@@ -93,6 +96,7 @@ class Inquiry:
     phases: Phases
     say: Progress
     executor: TaskRunner
+    known: Sequence[Fitted] = ()
 
     def free(self, current: Fitted) -> list[Candidate]:
         """Candidates that an explanation does not hold yet."""

@@ -21,6 +21,7 @@ from rollover.diagnosis.selection.restarts import (
     best_of_each,
     continued_from,
     from_other_starts,
+    with_known_minima,
     with_secondary_parameters,
     with_time_shifts,
 )
@@ -91,7 +92,7 @@ def step(inquiry: Inquiry, base: Fitted, scored: ScoreTest) -> Step | None:
         else with_secondary_parameters(inquiry, base, best_of_each(fits))
     )
     if not problem.effort.is_ensemble:
-        fits = with_time_shifts(inquiry, base, fits)
+        fits = with_known_minima(inquiry, base, with_time_shifts(inquiry, base, fits))
     if with_noise_of_fit(problem, fits[0], inquiry.phases):
         base, fits = problem.again(base), [problem.again(f) for f in fits]
     if not problem.effort.is_ensemble:

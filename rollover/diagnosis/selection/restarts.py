@@ -282,6 +282,25 @@ def with_time_shifts(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> 
     return sorted(with_common_time_shifts(inquiry, timed) + others, key=lambda f: f.chi2)
 
 
+def with_known_minima(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+    """The fits, begun again where those under another noise ended if that leaves less; never worse.
+
+    Which of several minima a search comes to hangs on the noise, which of two is the better one does not. What was not
+    fitted here is fitted too if it leaves about as little as the best.
+    """
+    found, size = {f.candidates[-1].key: f for f in fits}, sum(b.residual.size for b in base.blocks)
+    free = {c.key for c in inquiry.free(base)}
+    known = [f for f in inquiry.known if f.candidates[:-1] == base.candidates and f.candidates[-1].key in free]
+    ended = [f for f in inquiry.fits([continued_from(f, "fit") for f in known]) if f is not None]
+    least = min(f.chi2 for f in (*fits, *ended))
+    for new in ended:
+        old = found.get(new.candidates[-1].key)
+        most = TUNING.leading_misfit * least if old is None else old.chi2 - enough(old.chi2, size)
+        if new.chi2 < most:
+            found[new.candidates[-1].key] = new
+    return sorted(found.values(), key=lambda f: f.chi2)
+
+
 def with_common_time_shifts(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits; some recordings at the time shifts of the one that leaves least, where that is better; never worse.
 
