@@ -42,8 +42,9 @@ def rejected_effects(
 ) -> set[str]:
     """Ids of effects that are no finding: predicting no better than nothing does, or at a bound and worse than a rival.
 
-    Where `in_doubt`, all that are at a bound or maybe null. Of an effect alone the misfit itself is asked whether it
-    may be null, slopes only of one beside others.
+    What is at a bound beside the first effect bends to what the form of that one leaves. Where `in_doubt`, all that are
+    at a bound or maybe null. Of an effect alone the misfit itself is asked whether it may be null, slopes only of one
+    beside others.
     """
     if not effects:
         return set()
@@ -51,9 +52,11 @@ def rejected_effects(
     if after.total >= held_out(found.base, groups).total:
         return {e.id for e in effects}
     if not in_doubt:
-        chi2, rivals = float(after.chi2.sum()), found.first.rivals if found.first is not None else ()
+        first = found.first
+        chi2, rivals = float(after.chi2.sum()), first.rivals if first is not None else ()
         better = any(not is_at_bound(f) and float(held_out(f, groups).chi2.sum()) < chi2 for f in rivals)
-        return at_bounds(effects) if better else set()
+        leads = effects[0].id if first is None or len(effects) == 1 else first.fitted.candidates[-1].id
+        return at_bounds(effects) - (set() if better else {leads})
     null = {e.id for e in effects if may_be_null(e)}
     if len(effects) == 1 and null and is_clear_of_null(problem, found.fitted):
         null = set()

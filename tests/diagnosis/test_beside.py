@@ -13,10 +13,11 @@ import pytest
 from rollover.diagnosis import alone
 from rollover.diagnosis.alone import alike_beside, best_predictor, times_shown, verdict_on_single_effect
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, at_an_end
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
-from rollover.diagnosis.result import Share
+from rollover.diagnosis.invariants import rejected_effects
+from rollover.diagnosis.result import Interval, Named, Share
 from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.selection.forward_step import by_chance, confusion_set
 from rollover.diagnosis.selection.score_test import ScoreTest
@@ -265,3 +266,34 @@ def test_a_part_surely_predicted_is_named_within_the_tolerance(low: float, is_es
     said = usual_model_error_sentence({"ground/sinkage": 0.021}, 1e-9, 6, best)
     assert "2.1% of ground/sinkage" in said
     assert ("predicted by sensor-bias: 35% (12% to 58%)" in said) is is_estimated
+
+
+@pytest.mark.parametrize(
+    ("at_bound", "ids", "rival", "rejected"),
+    [
+        ("sensor-clock-drift", ("soil-layer", "sensor-clock-drift"), 0.9, {"sensor-clock-drift"}),
+        ("soil-layer", ("soil-layer", "sensor-clock-drift"), 0.9, set()),  # the first, and nothing is better
+        ("soil-layer", ("soil-layer",), 0.9, set()),
+        ("soil-layer", ("soil-layer", "sensor-clock-drift"), 0.1, {"soil-layer"}),
+        ("soil-crust", ("soil-crust",), 0.9, set()),  # all there is, in the first one's place
+    ],
+)
+def test_beside_the_first_no_effect_may_stand_at_a_bound(
+    at_bound: str, ids: tuple[str, ...], rival: float, rejected: set[str]
+) -> None:
+    found = explanation(SOME, fitted("soil-layer", (0.2,) * DROPS), fitted("guide-friction", (rival,) * DROPS))
+    effects = [
+        Named(
+            id=id, kind="physics", channel=None, statement="", p_value=0.0, indistinguishable_from=(), settings={},
+            discriminating_test="",
+            parameters={"strength": Interval(value=1.0, low=0.9, high=1.1, unit="1", at_bound=id == at_bound)},
+        )
+        for id in ids
+    ]  # fmt: skip
+    assert rejected_effects(PROBLEM, found, effects, GROUPS, in_doubt=False) == rejected
+
+
+def test_a_coordinate_hard_by_an_end_is_at_it() -> None:
+    """A search that ends at a bound stops some 1e-5 of the range before it."""
+    assert [at_an_end(x) for x in (0.0, 9e-6, 0.5, 1.0 - 9e-6, 1.0)] == [True, True, False, True, True]
+    assert not at_an_end(2e-4)
