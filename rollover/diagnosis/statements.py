@@ -193,8 +193,8 @@ def usual_model_error_sentence(
 def step_error_note(effects: Sequence[Named]) -> list[str]:
     """What the scenario's own steps would have said of values, where that is far off beside their intervals."""
     return [
-        f"{effect.id} {name}: {i.value:.4g} {i.unit}".rstrip()
-        + f" by steps of 1/{SETTINGS.fit.ensemble_mean.finer_parts} of the scenario's, in its own {i.as_simulated:.4g}"
+        f"{effect.id} {name}: {i.value:.4g} {'' if i.unit == '1' else i.unit}".rstrip()
+        + f" in steps of 1/{SETTINGS.fit.ensemble_mean.finer_parts} of the scenario's, {i.as_simulated:.4g} in these"
         for effect in effects
         for name, i in effect.parameters.items()
         if i.as_simulated is not None and abs(i.as_simulated - i.value) > TUNING.notable_change * (i.high - i.low)
@@ -359,8 +359,7 @@ def sentence(
     if without is None or with_ is None:
         return f"{falls}.{also}"
     first_impact = (
-        f"before the first impact, where runs do not scatter, the misfit is {with_:.2f} times the noise "
-        f"for {without:.1f}"
+        f"before the first impact, where runs do not scatter, it is {with_:.2f} times the noise, without {without:.2f}"
     )
     return f"{falls} and the scatter of runs; {first_impact}.{also}"
 

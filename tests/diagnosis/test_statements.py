@@ -109,7 +109,7 @@ def test_a_misfit_with_scatter_or_unexplained_is_reported() -> None:
     assert unexplained.endswith("no candidate explains it.")
     said = sentence("parameter", [tilted], 0.0, first, last, [], (6.94, 1.02))
     assert said.startswith(plain[:-1] + " and the scatter of runs; before the first impact")
-    assert said.endswith("the misfit is 1.02 times the noise for 6.9.")
+    assert said.endswith("where runs do not scatter, it is 1.02 times the noise, without 6.94.")
 
 
 def test_an_effect_all_of_whose_intervals_hold_null_is_said() -> None:
