@@ -139,7 +139,7 @@ def concluded(
     notes += inconsistent_repeats(found)
     is_cross_validated = len(groups) > 1 or bool(validation)
     if not is_cross_validated:
-        notes.append("one condition only: what stands as held out is predicted by the fit to it")
+        notes.append("one recording only: what is given as held out is of the fit to it")
     problem = Problem(found)
     executor.begin(problem)
     estimate_time_shifts(problem)

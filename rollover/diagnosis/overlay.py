@@ -8,8 +8,9 @@ neighbours does, and are shown with what these differ by: what no simulation is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,10 +103,17 @@ def overlays_of(
     for name, recording in zeros_from_contact(scenario, recordings)[0]:
         laid = {CENTRE: found.grids[name]} if name in found.grids else {}
         other = diagnosed.replaced(laid) if found.effects or found.empirical else None
-        one = _overlay_of(name, recording, scenario.replaced(laid), other, name in judged, children)
+        left = _left_conditions(recording, found)
+        one = _overlay_of(name, recording, scenario.replaced(laid), other, left, name in judged, children)
         if one is not None:
             overlays.append(one)
     return tuple(overlays)
+
+
+def _left_conditions(recording: Recording, found: Diagnosis) -> Mapping[str, Any]:
+    """Conditions but those that state other numbers of what was found, as an importer may."""
+    replaced = {f"effects.{e.id}.{name}" for e in found.effects for name in e.settings}
+    return {path: v for path, v in recording.conditions.items() if path not in replaced}
 
 
 def _overlay_of(
@@ -113,11 +121,15 @@ def _overlay_of(
     recording: Recording,
     scenario: Scenario,
     diagnosed: Scenario | None,
+    left: Mapping[str, Any],
     held_out: bool,
     children: Children | None,
 ) -> Overlay | None:
+    """`left` are the conditions of the recording under which it is `diagnosed`."""
     recording, reference = on_attitude_branch(scenario, recording)
-    made = [_simulators(one, recording, reference) for one in (scenario, diagnosed) if one is not None]
+    made = [_simulators(scenario, recording, reference)]
+    if diagnosed is not None:
+        made.append(_simulators(diagnosed, replace(recording, conditions=left), reference))
     full = [runs for _, *both, _ in made for one in both if (runs := full_runs(one)) is not None]
     for runs in full:
         runs.children = children

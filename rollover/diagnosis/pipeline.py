@@ -37,7 +37,7 @@ from rollover.recording.attitude import continuous
 from rollover.scenario import Scenario, load
 from rollover.spec.vehicle import Striker
 
-COMMON = "what {} references have in common was taken off each channel, as far as each of them repeats the others"
+COMMON = "the common part of what {} references show was subtracted, as far as each of them repeats the others"
 HALF = SETTINGS.report.grades.half_share
 WITHIN_TOLERANCE = (
     "the tolerance is the most that a scenario may miss the curves by: beside an error of its size nothing is named;"
@@ -163,7 +163,7 @@ def _within_tolerance(
     It surely predicts half of the mismatch: of an effect that resembles a background the interval of its share reaches
     below.
     """
-    asked.say("what is tolerated may hide an effect: again beside a discrepancy of no more than that")
+    asked.say("the tolerance may hide an effect: once more beside an estimated background of at most that size")
     found = _diagnosed(replace(asked, discrepancy=None, estimates=True), every, inconsistencies, notes)
     is_sure = any(e.explains is not None and e.explains.low >= HALF for e in found.effects) or found.answer == "whole"
     return replace(found, notes=(*found.notes, WITHIN_TOLERANCE)) if is_sure else None
@@ -205,7 +205,7 @@ def _beside_estimated_discrepancy(
         return None
     several = [tried.fitted] if len(tried.fitted.candidates) > 1 else []
     learned = estimated(found.problem, tried.base, [*_rivals(tried), *several]).at_most(asked.bounds)
-    asked.say("a model is never exact: again beside a discrepancy of the size that explanations leave")
+    asked.say("noise alone explains too little: once more beside an estimated background")
     asked = replace(asked, known=_rivals(tried))  # a minimum that was found stays found
     other = concluded(
         replace(asked, discrepancy=learned), with_discrepancy(every, learned), found.inconsistencies, notes

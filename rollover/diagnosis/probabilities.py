@@ -33,10 +33,13 @@ def probabilities(
 ) -> dict[str, float]:
     """Probability of each name to be what is mainly missing, the largest first; they add up to one.
 
+    None where nothing but falls was recorded, and more than noise is left: (D24) is of what comes after a contact.
     `tried` is what competed, `found` what was decided on, `candidates` how many effects could act. `is_noise` says that
     what `found` leaves is noise: samples tell then, else one draw of a discrepancy for all recordings.
     `p_value` is that of the best effect's gain on conditions held out, by (D21).
     """
+    if not is_noise and not residual_rms(problem, tried.base):
+        return {}
     log_evidence = _beside_noise(problem, tried, found) if is_noise else _beside_discrepancy(problem, tried)
     prior = {NOTHING: TUNING.nothing, NOT_LISTED: TUNING.not_listed}
     listed = 1.0 - TUNING.nothing - TUNING.not_listed
@@ -100,10 +103,10 @@ def most_for_nothing(p_value: float, others: Sequence[float]) -> float:
 
 
 def log_evidence(problem: Problem, fitted: Fitted) -> float:
-    """Log evidence of a fit beside a discrepancy that is one draw for all recordings, (D24)."""
+    """Log evidence of a fit beside a discrepancy that is one draw for all recordings, (D24); 0 where none acts."""
     left = residual_rms(problem, fitted)
     usual = sum(log_usual(v, resolution(problem, c)) for c, v in left.items())
-    return usual - 0.5 * len(fitted.x) * float(np.log(DRAWS * len(left)))
+    return usual - 0.5 * len(fitted.x) * float(np.log(DRAWS * len(left))) if left else 0.0
 
 
 def credible(problem: Problem, fits: Sequence[Fitted]) -> list[Fitted]:

@@ -89,7 +89,8 @@ def reported(c: Conclusion) -> Diagnosis:
     if recording_fault is None:
         said += by_share(effects, shares, estimated=c.is_estimated)
     said += offered(law) + inconsistency_sentences(c.inconsistencies) + contradiction_clause(verdict, contrary)
-    said += tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found, taught=is_taught)
+    source = "taught" if is_taught else "estimated" if c.is_estimated else "stated"
+    said += tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found, source=source)
     said += no_contact_clause(found)
     return Diagnosis(
         verdict=verdict,
@@ -231,7 +232,7 @@ def _cost(found: Sequence[Dataset]) -> list[str]:
     """What full runs took, where there were any."""
     made = [s for e in found if (s := full_runs(e.simulator)) is not None]
     runs, seconds = sum(s.runs for s in made), sum(s.seconds for s in made)
-    return [f"{runs} full runs of {1e3 * seconds / runs:.0f} ms on the average"] if runs else []
+    return [f"{runs} full runs of {1e3 * seconds / runs:.0f} ms on average"] if runs else []
 
 
 def with_clock_finding(found: Diagnosis, late: Mapping[str, float], problem: Problem, tried: Explanation) -> Diagnosis:

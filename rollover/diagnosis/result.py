@@ -19,6 +19,12 @@ Verdict = Literal["no-mismatch", "parameter", "sensor", "missing-physics", "unex
 Estimate = bool | Literal["unexplained"]
 
 Answer = Literal["nothing", "immaterial", "whole", "part", "likeness", "unexplained", "cannot-tell"]
+LEAST_P_VALUE = 1e-12  # below it a tail of chi-square says nothing of recordings; chosen
+
+
+def chance(p_value: float) -> str:
+    """A p-value as a sentence states it: one that underflows is not 0."""
+    return f"p < {LEAST_P_VALUE:g}" if p_value < LEAST_P_VALUE else f"p = {p_value:.2g}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,8 +102,8 @@ class NextTest:
         """The sentence."""
         value = f"{self.value:g} {self.unit}".rstrip()
         return (
-            f"{self.path} {value} at {self.rate:.4g} Hz with {', '.join(self.channels)} would tell them apart with "
-            f"{self.probability:.0%}"
+            f"a test with {self.path} {value}, recorded at {self.rate:.4g} Hz ({', '.join(self.channels)}), would "
+            f"distinguish them with a probability of {self.probability:.0%}"
         )
 
 
@@ -229,6 +235,6 @@ class Diagnosis:
         for e in self.effects:
             if e.indistinguishable_from:
                 others = ", ".join(e.indistinguishable_from)
-                said.append(f"{e.id} or {others}: measure next: {e.discriminating_test}")
+                said.append(f"{e.id} or {others}? Measure next: {e.discriminating_test}")
         headings = ("effect", "channel", "parameter", "value", "95 % from", "to", "unit")
         return card(self.verdict, [*said, *self.notes], headings, rows, words=(0, 1, 2, 6))

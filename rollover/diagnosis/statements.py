@@ -18,7 +18,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
-from rollover.diagnosis.result import Considered, Diagnosis, Location, Named, Score, Share, Verdict
+from rollover.diagnosis.result import Considered, Diagnosis, Location, Named, Score, Share, Verdict, chance
 from rollover.diagnosis.selection.explanation import Explanation, strongest
 from rollover.diagnosis.selection.forward_step import confusion_set
 from rollover.diagnosis.settings import SETTINGS
@@ -26,6 +26,11 @@ from rollover.effects import EFFECTS
 
 TUNING = SETTINGS.report.statements
 PULLS = SETTINGS.inference.condition_pulls
+CURES = {  # by where the size of what passes comes from: what that is, and what may show an effect in it
+    "stated": ("what is tolerated", "a smaller --tolerance, or values known better than their stated uncertainty,"),
+    "taught": ("what is tolerated", "a model that meets the references better, or more of them,"),
+    "estimated": ("such a background", "recordings under other conditions, or --reference,"),
+}
 
 
 def named(
@@ -149,11 +154,11 @@ def by_share(effects: Sequence[Named], scales: Mapping[str, float], *, estimated
     for e in found:
         assert e.explains is not None
         share, low, high = (max(v, 0.0) for v in (e.explains.share, e.explains.low, e.explains.high))
-        nuance = "; in another form, or beside more" if e.answer == "likeness" and scales else ""
+        nuance = "; its law may have another form, or more is missing" if e.answer == "likeness" and scales else ""
         said += f" {e.id} explains {share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch{nuance}."
     if found and scales:
         how = "estimated" if estimated else "allowed for"
-        said += f" A background was {how} beside it (1 sigma, of the range: {background(scales)})."
+        said += f" A background was {how} beside it (standard deviation as a share of the range: {background(scales)})."
     return said
 
 
@@ -176,11 +181,11 @@ def usual_model_error_sentence(
         some = (
             f" Part of it is predicted by {candidate.id}{of}: {found.share:.0%} ({found.low:.0%} to {found.high:.0%})."
         )
-    how, most = ("a taught", "the references miss") if taught else ("an estimated", "models usually miss")
+    how, most = ("a", "the references show") if taught else ("an estimated", "models usually miss")
     least = "surely predicts some" if taught else "predicts half"
     return (
-        f"Simulation and {recordings} recordings agree but for {how} background (1 sigma, of the range: "
-        f"{background(scales)}): more than noise (p = {p_value:.2g}), no more than {most}, and no effect "
+        f"Simulation and {recordings} recordings agree but for {how} background (standard deviation as a share of the "
+        f"range: {background(scales)}). It is more than noise ({chance(p_value)}) and no more than {most}; no effect "
         f"that could be named {least} of it on recordings that were held out.{some}"
     )
 
@@ -188,8 +193,8 @@ def usual_model_error_sentence(
 def step_error_note(effects: Sequence[Named]) -> list[str]:
     """What the scenario's own steps would have said of values, where that is far off beside their intervals."""
     return [
-        f"{effect.id} {name}: {i.value:.4g} {i.unit}".rstrip()
-        + f" by steps of 1/{SETTINGS.fit.ensemble_mean.finer_parts} of the scenario's, in its own {i.as_simulated:.4g}"
+        f"{effect.id} {name}: {i.value:.4g} {'' if i.unit == '1' else i.unit}".rstrip()
+        + f" in steps of 1/{SETTINGS.fit.ensemble_mean.finer_parts} of the scenario's, {i.as_simulated:.4g} in these"
         for effect in effects
         for name, i in effect.parameters.items()
         if i.as_simulated is not None and abs(i.as_simulated - i.value) > TUNING.notable_change * (i.high - i.low)
@@ -282,11 +287,11 @@ def is_hardly_tolerated(found: Diagnosis) -> bool:
 
 
 def tolerance_clause(
-    verdict: Verdict, p_value: float, score: Score | None, dataset: Sequence[Dataset], *, taught: bool = False
+    verdict: Verdict, p_value: float, score: Score | None, dataset: Sequence[Dataset], *, source: str = "stated"
 ) -> str:
-    """What a sentence goes on with where a stated tolerance lets pass poor curves, or a peak force that is off by more.
+    """What a sentence goes on with where poor curves pass, or a peak force that is off by more than what is let pass.
 
-    Poor is what ISO/TS 18571 calls so. `taught` says that references told what is tolerated.
+    Poor is what ISO/TS 18571 calls so; `source` (of `CURES`) says where that comes from.
     """
     is_beyond_noise = verdict == "no-mismatch" and p_value < SETTINGS.inference.lack_of_fit.p_value
     if not is_beyond_noise or score is None:
@@ -301,12 +306,8 @@ def tolerance_clause(
         said = f"A peak force is off by {abs(peak):.0%}"
     else:
         return ""
-    cure = (
-        "a model that meets the references better, or more of them,"
-        if taught
-        else "a smaller --tolerance, or values known better than their stated uncertainty,"
-    )
-    return f" {said}: what is tolerated may hide an effect; {cure} may show it."
+    hides, cure = CURES[source]
+    return f" {said}: {hides} may hide an effect; {cure} may show it."
 
 
 def sentence(
@@ -332,11 +333,11 @@ def sentence(
         model_error_dominates = any(e.model_error_dominates(s) for e in dataset for s in e.signals)
         beyond = " beyond what is tolerated or repeats differ by" if model_error_dominates else ""
         return (
-            f"Simulation and {len(dataset)} recordings differ by more than noise (p = {p_value:.2g}), but by less "
+            f"Simulation and {len(dataset)} recordings differ by more than noise ({chance(p_value)}), but by less "
             f"than {SETTINGS.inference.adequacy.negligible:.1%} of any channel's range{beyond}."
         )
     if verdict == "no-mismatch":
-        return f"Simulation and {len(dataset)} recordings agree within the noise (p = {p_value:.2g})."
+        return f"Simulation and {len(dataset)} recordings agree within the noise ({chance(p_value)})."
     if verdict == "cannot-tell":
         return "These recordings are too weak to show even effects of typical strength: no statement is possible."
     if verdict == "unexplained":
@@ -347,9 +348,7 @@ def sentence(
     said = " ".join(e.statement for e in effects)
     rivals = sorted({r for e in effects for r in e.indistinguishable_from})
     also = (
-        ""
-        if cross_validated
-        else " With one condition nothing can be held out: this is the misfit of the fitted recordings."
+        "" if cross_validated else " With one recording nothing can be held out: this is the misfit of the fit to it."
     )
     also += " The unexplained residual has structure: these effects are not the whole difference." if remains else ""
     also += f" Not distinguishable by these recordings: {', '.join(rivals)}." if rivals else ""
@@ -360,8 +359,7 @@ def sentence(
     if without is None or with_ is None:
         return f"{falls}.{also}"
     first_impact = (
-        f"before the first impact, where runs do not scatter, the misfit is {with_:.2f} times the noise "
-        f"for {without:.1f}"
+        f"before the first impact, where runs do not scatter, it is {with_:.2f} times the noise, without {without:.2f}"
     )
     return f"{falls} and the scatter of runs; {first_impact}.{also}"
 
@@ -391,4 +389,4 @@ def pull_notes(problem: Problem, fitted: Fitted) -> list[str]:
     if not large:
         return []
     said = ", ".join(f"{path} by {z:+.1f}" for path, z in large.items())
-    return [f"what is stated as uncertain takes up part of the mismatch: {said} of its standard deviation"]
+    return [f"what is stated as uncertain absorbs part of the mismatch: {said} of its standard deviations"]

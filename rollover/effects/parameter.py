@@ -25,7 +25,7 @@ class Mass(Effect):
     family = "a wrong inertia"
     equation = "m -> m + added"
     source = "driver 75-100 kg (recalled)"
-    sentence = "The mass is {added:more|less} than was written down."
+    sentence = "The mass is {added:more|less} than stated."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-gain": "the level at rest, which is m g, against a weighed mass",
         "guide-friction": "the free fall before contact",
@@ -84,7 +84,7 @@ class Inertia(Effect):
     family = "a wrong inertia"
     equation = "J -> scale J"
     source = "estimates from the size of a vehicle, 10-20 % (recalled)"
-    sentence = "The moments of inertia are {scale} times what was written down."
+    sentence = "The moments of inertia are {scale} times what was stated."
     rivals: ClassVar[Mapping[str, str]] = {"centre-of-mass": "a static tilt test: inertia has no part in it"}
     acts = ("rollover",)
     channels = ("chassis/angular_velocity_x", "chassis/roll")
@@ -113,7 +113,7 @@ class SlopeError(Effect):
     family = "a wrong direction of gravity"
     equation = "inclination -> inclination + angle, towards y on level ground"
     source = "1 deg is 0.17 m/s2 (computed)"
-    sentence = "The ground is inclined by {angle:more|less} than was written down."
+    sentence = "The ground is inclined by {angle:more|less} than stated."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-bias": "turn the vehicle round: gravity stays, a bias turns",
         "centre-of-mass": "the same test downhill the other way",
@@ -136,7 +136,7 @@ class SlopeError(Effect):
 
 @parameters
 class ImpactSpeed(Effect):
-    """v_s -> scale v_s: the drop was from another height than was written down."""
+    """v_s -> scale v_s: the drop was from another height than stated."""
 
     scale: Annotated[float, Quantity("1", "of the speed at first contact", above=0, most=3)] = 1.02
 
@@ -145,7 +145,7 @@ class ImpactSpeed(Effect):
     family = "a wrong start"
     equation = "v_s -> scale v_s"
     source = "definition"
-    sentence = "The speed at first contact is {scale} times what was written down."
+    sentence = "The speed at first contact is {scale} times what was stated."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-viscous-damping": "the integral of the acceleration before contact",
         "sensor-scale": "the double integral of the acceleration against the displacement",

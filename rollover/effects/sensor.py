@@ -186,7 +186,7 @@ class SensorScale(Effect):
     family = "a channel read at a wrong scale"
     equation = "y = scale x"
     source = "1-2 % for displacement sensors (recalled)"
-    sentence = "{channel} reads {scale} times what is."
+    sentence = "{channel} reads {scale} times the true value."
     rivals: ClassVar[Mapping[str, str]] = {
         "co-moving-mass": "the double integral of the acceleration against the displacement",
         "impact-speed": "the double integral of the acceleration against the displacement",
@@ -222,7 +222,7 @@ class SensorGain(Effect):
     family = "a channel read at a wrong scale"
     equation = "y = gain x"
     source = "1-5 % (recalled)"
-    sentence = "{channel} reads {gain} times what is."
+    sentence = "{channel} reads {gain} times the true value."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-bias": "the level before contact, where a gain reads nothing",
         "sensor-misalignment": "a motion across the channel: a gain reads nothing of it",

@@ -188,7 +188,7 @@ class GyroscopicRotor(Effect):
     family = "a moment that couples roll, pitch and yaw"
     equation = "M = -omega x H"
     source = "flywheel of 1.5 kg m2 at 2200 rpm: 345 N m s; 1.7 kN m at 5 rad/s (computed)"
-    sentence = "Something spins in the chassis with {angular_momentum}: turning it over turns it aside."
+    sentence = "A part that spins in the chassis with {angular_momentum} acts on it as a gyroscope."
     rivals: ClassVar[Mapping[str, str]] = {"ground-friction": "the same test with the engine off"}
     acts = ("rollover",)
     channels = ("chassis/yaw", "chassis/pitch", "chassis/angular_velocity_z")

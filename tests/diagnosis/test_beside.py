@@ -254,9 +254,9 @@ def test_rivals_of_a_family_whose_form_is_refuted() -> None:
 def test_many_scales_are_stated_by_the_least_and_the_most() -> None:
     scales = {f"c{k}": 0.01 * (k + 1) for k in range(9)}
     said = usual_model_error_sentence(scales, 1e-9, 4, taught=True)
-    assert "a taught background (1 sigma, of the range: 1.0% of c0 to 9.0% of c8)" in said
+    assert "agree but for a background (standard deviation as a share of the range: 1.0% of c0 to 9.0% of c8)" in said
     assert "c4" not in said
-    assert "no more than the references miss" in said
+    assert "no more than the references show" in said
 
 
 @pytest.mark.parametrize(("low", "is_estimated"), [(0.12, True), (-0.05, False)])

@@ -360,11 +360,11 @@ def test_what_is_held_out_has_no_part_in_the_fit() -> None:
 
 def test_one_condition_alone_says_that_nothing_was_held_out() -> None:
     found = diagnose(scenario(), recorded({}, speeds=(2.0,)))
-    assert any("one condition only" in note for note in found.notes)
+    assert any("one recording only" in note for note in found.notes)
     named = diagnose(scenario(), recorded(GAIN, speeds=(2.0,)))
     assert named.effects
     assert "the misfit falls" in named.sentence
-    assert "With one condition nothing can be held out" in named.sentence
+    assert "With one recording nothing can be held out" in named.sentence
 
 
 def test_a_rebound_is_searched_from_the_laws_own_restitution() -> None:

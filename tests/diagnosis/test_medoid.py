@@ -317,7 +317,7 @@ def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.Monke
     assert asked == [{}, {}, {0: (-1.0, 1.0)}]
     told = [cast(Any, SimpleNamespace(id="slope", parameters={"angle": i})) for i in (by_itself, whole)]
     assert step_error_note(told) == [
-        f"slope angle: {fine.x[0]:.4g} rad by steps of 1/4 of the scenario's, in its own {fitted.x[0]:.4g}"
+        f"slope angle: {fine.x[0]:.4g} rad in steps of 1/4 of the scenario's, {fitted.x[0]:.4g} in these"
     ]
     hardly = replace(whole, as_simulated=whole.value + 0.01 * (whole.high - whole.low))
     assert step_error_note([cast(Any, SimpleNamespace(id="slope", parameters={"angle": hardly}))]) == []

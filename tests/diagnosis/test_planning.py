@@ -340,7 +340,7 @@ def test_a_diagnosis_asks_for_the_drop_where_its_fits_differ() -> None:
     assert found.probability > 0.9
     assert found.channels == (FORCE, DEPTH)
     assert found.rate == pytest.approx(300.0)
-    assert found.message().endswith(f"would tell them apart with {found.probability:.0%}")
+    assert found.message().endswith(f"would distinguish them with a probability of {found.probability:.0%}")
     loud = [replace(e, signals=tuple(replace(s, noise=10.0 * s.noise) for s in e.signals)) for e in dataset]
     less = next_test(scenario(), loud, one, other)
     assert less is not None

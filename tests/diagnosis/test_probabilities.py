@@ -68,6 +68,15 @@ def test_of_two_alike_the_one_of_fewer_numbers_is_likelier(monkeypatch: pytest.M
     assert found["mass"] == pytest.approx(found["soil-layer"] * np.sqrt(2.0 * len(CHANNELS)))
 
 
+def test_a_fall_alone_says_nothing_of_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No channel is left of what comes after a contact: no probability, and none of several is excluded."""
+    monkeypatch.setattr(module, "residual_rms", lambda *_: {})
+    one, other = fitted("air-drag", (1.0,) * DROPS), fitted("sensor-scale", (3.0,) * DROPS, 2)
+    tried = explanation((9.0,) * DROPS, one, other)
+    assert probabilities(PROBLEM, tried, tried, 40, is_noise=False) == {}
+    assert credible(PROBLEM, [one, other]) == [one, other]
+
+
 def test_what_models_usually_miss_is_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     found = beside(monkeypatch, 0.02, {"soil-layer": 0.016, "soil-crust": 0.018})
     assert found["nothing"] > 0.6

@@ -45,7 +45,10 @@ def test_phases_need_no_depth_gauge() -> None:
     assert without["peak"] == pytest.approx(with_depth["peak"], rel=0.05)
 
 
-@pytest.mark.parametrize(("p", "said"), [(0.3, "agree within the noise (p = 0.3)"), (1e-9, "less than 0.1%")])
+@pytest.mark.parametrize(
+    ("p", "said"),
+    [(0.3, "agree within the noise (p = 0.3)"), (1e-9, "less than 0.1%"), (0.0, "more than noise (p < 1e-12)")],
+)
 def test_a_sure_but_negligible_effect_is_not_called_noise(p: float, said: str) -> None:
     nothing = HeldOutMisfit(chi2=np.ones(1), count=np.ones(1))
     assert said in sentence("no-mismatch", (), p, nothing, nothing, [])
@@ -101,12 +104,12 @@ def test_a_misfit_with_scatter_or_unexplained_is_reported() -> None:
     more = sentence("parameter", [tilted], 0.0, first, last, [], remains=True)
     assert more == plain + " The unexplained residual has structure: these effects are not the whole difference."
     one = sentence("parameter", [tilted], 0.0, first, last, [], cross_validated=False)
-    assert one.startswith(plain.replace("held-out ", "") + " With one condition nothing can be held out")
+    assert one.startswith(plain.replace("held-out ", "") + " With one recording nothing can be held out")
     unexplained = sentence("unexplained", (), 0.0, first, last, [], cross_validated=False)
     assert unexplained.endswith("no candidate explains it.")
     said = sentence("parameter", [tilted], 0.0, first, last, [], (6.94, 1.02))
     assert said.startswith(plain[:-1] + " and the scatter of runs; before the first impact")
-    assert said.endswith("the misfit is 1.02 times the noise for 6.9.")
+    assert said.endswith("where runs do not scatter, it is 1.02 times the noise, without 6.94.")
 
 
 def test_an_effect_all_of_whose_intervals_hold_null_is_said() -> None:
@@ -211,6 +214,9 @@ def test_a_tolerance_that_lets_poor_curves_pass_is_said(
     assert ("By ISO 18571 they are poor (0.52): what is tolerated may hide an effect" in said) == told
     assert bool(said) == told
     assert statements.tolerance_clause(verdict, p_value, None, dataset) == ""
-    by_references = statements.tolerance_clause(verdict, p_value, score, dataset, taught=True)
+    by_references = statements.tolerance_clause(verdict, p_value, score, dataset, source="taught")
     assert ("a model that meets the references better" in by_references) == told
     assert "--tolerance" not in by_references
+    beside = statements.tolerance_clause(verdict, p_value, score, dataset, source="estimated")
+    assert ("such a background may hide an effect; recordings under other conditions" in beside) == told
+    assert "--tolerance" not in beside  # nobody stated one

@@ -320,7 +320,7 @@ def test_the_listing_shows_what_each_effect_is() -> None:
         ("centre-of-mass", {"height": 0.04, "lateral": -0.01}, "lies 0.04 m higher and 0.01 m further to the right."),
         ("sensor-clock-offset", {"channel": "ground/sinkage", "offset": -0.002}, "comes 0.002 s early."),
         ("sensor-bias", {"channel": "ground/sinkage", "bias": -0.003}, "reads 0.003 m too little throughout."),
-        ("mass", {"added": 30.0}, "is 30 kg more than was written down."),
+        ("mass", {"added": 30.0}, "is 30 kg more than stated."),
     ],
 )
 def test_a_sentence_says_which_way_and_by_how_much(id: str, values: dict[str, Any], said: str) -> None:

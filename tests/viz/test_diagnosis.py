@@ -84,12 +84,24 @@ def test_the_page_where_nothing_was_found() -> None:
     assert "Where they differ" not in parts.said
 
 
-def test_one_condition_is_not_called_held_out() -> None:
+def test_one_recording_is_not_called_held_out() -> None:
+    """Of several under one condition each is held out in turn."""
     found = replace(sensor_at_fault(), training=("one", "two"), held_out=("one", "two"))
+    alone = replace(found, training=("one",), held_out=("one",))
     alike = tuple(replace(t, condition="initiation.speed=3") for t in overlays())
-    for shown, single in ((overlays(), False), (alike, True)):
-        text = page(found, shown, title="Drop", command="rollover diagnose x")
+    for about, shown, single, one in (
+        (found, overlays(), False, False),
+        (found, alike, False, True),
+        (alone, alike[:1], True, False),
+    ):
+        text = page(about, shown, title="Drop", command="rollover diagnose x")
         assert ("nothing could be held out" in text) == single
+        assert ("All recordings share one condition" in text) == one
+
+
+@pytest.mark.parametrize(("p_value", "said"), [(0.3, "agree within the noise."), (1e-9, "more than noise")])
+def test_what_is_tolerated_is_not_called_noise(p_value: float, said: str) -> None:
+    assert said in answer(replace(nothing_found(), p_value=p_value))
 
 
 def test_each_verdict_has_its_sentence() -> None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from rollover.diagnosis import Diagnosis
 from rollover.diagnosis.overlay import Overlay, Track
+from rollover.diagnosis.settings import SETTINGS
 from rollover.spec.channels import is_known
 from viz.content.blocks import State
 from viz.content.entities import series
@@ -27,10 +28,14 @@ ANSWERS: Mapping[str, str] = {
     "cannot-tell": "These recordings are too weak for a statement.",
 }
 
+TOLERATED = "Simulation and recordings differ by more than noise, but by no more than is tolerated."
+
 
 def answer(found: Diagnosis) -> str:
     """The verdict in one line, with the names of what was found."""
     line = ANSWERS[found.verdict]
+    if found.verdict == "no-mismatch" and found.p_value < SETTINGS.inference.lack_of_fit.p_value:
+        return TOLERATED
     if not found.effects:
         return line
     return f"{line.removesuffix('.')}: {', and '.join(named(e.id, e.channel) for e in found.effects)}."
@@ -68,7 +73,7 @@ def markdown(found: Diagnosis) -> str:
         if e.indistinguishable_from:
             lines += [f"Not distinguishable from {', '.join(e.indistinguishable_from)}.", ""]
             lines += [f"Measure next: {e.discriminating_test}.", ""] if e.discriminating_test else []
-            lines += [f"By these recordings: {e.next_test.message()}.", ""] if e.next_test is not None else []
+            lines += [f"Judging by these recordings, {e.next_test.message()}.", ""] if e.next_test is not None else []
     if found.where:
         lines += ["## Where", "", "| recording | channel | phase | share |", "|-|-|-|-|"]
         lines += [f"| {p.recording} | {p.channel} | {p.phase} | {100.0 * p.share:.0f} % |" for p in found.where[:6]]

@@ -187,10 +187,11 @@ def _followed(found: Diagnosis, overlays: Sequence[Overlay], each: Each) -> list
                 rows.append([title, ", ".join(names), when, *_score(scores[which])])
     if not rows:
         return []
-    in_turn = set(found.training) == set(found.held_out)
     how = "Held out: the misfit is predicted from a fit to the others; rating and peak are of the fit to all."
-    if in_turn and len({t.condition or t.recording for t in overlays}) < 2:
-        how = "All recordings share one condition: nothing could be held out, and all numbers are of the fit."
+    if set(found.training) == set(found.held_out) and len(found.training) < 2:
+        how = "With one recording nothing could be held out, and all numbers are of the fit."
+    elif len({t.condition or t.recording for t in overlays}) < 2:
+        how += " All recordings share one condition: nothing is said of others."
     heads = ["", "recordings", "", "misfit / noise", "ISO/TS 18571", "peak force error, %"]
     blocks: list[Block] = [Table(columns=heads, rows=rows, numeric=(3, 4, 5), caption=how)]
     per = [[name, predicted_as(found, name), _g(a, 3), _g(b, 3)] for name, a, b in found.per_recording]
@@ -224,7 +225,7 @@ def _next(found: Diagnosis) -> list[Block]:
             if e.discriminating_test:
                 blocks.append(Note(text=f"Measure next: {e.discriminating_test}."))
             if e.next_test is not None:
-                blocks.append(Note(text=f"By these recordings: {e.next_test.message()}."))
+                blocks.append(Note(text=f"Judging by these recordings, {e.next_test.message()}."))
         else:
             confirm = f" To confirm it: {e.discriminating_test}." if e.discriminating_test else ""
             blocks.append(Note(text=f"{own}: no other candidate predicts the held-out recordings as well.{confirm}"))

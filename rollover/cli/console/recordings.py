@@ -144,9 +144,9 @@ def diagnosis(found: Diagnosis, folder: str) -> None:
             stated = f"{e.explains.share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch"
             out.print(f"{e.id}: {e.answer}, {stated}")
         if e.indistinguishable_from:
-            out.print(f"{e.id} or {', '.join(e.indistinguishable_from)}: measure next: {e.discriminating_test}")
+            out.print(f"{e.id} or {', '.join(e.indistinguishable_from)}? Measure next: {e.discriminating_test}")
         if e.next_test is not None:
-            out.print(f"By these recordings: {e.next_test.message()}.")
+            out.print(f"Judging by these recordings, {e.next_test.message()}.")
     for note in found.notes:
         out.print(note, style="yellow")
     out.print(f"Results: {folder}")

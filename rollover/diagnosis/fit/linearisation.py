@@ -144,7 +144,7 @@ class Fitted:
     @property
     def label(self) -> str:
         """Keys of the effects."""
-        return " + ".join(c.key for c in self.effects) or "as it is"
+        return " + ".join(c.key for c in self.effects) or "the scenario as it is"
 
 
 def total_of(blocks: Sequence[ResidualBlock]) -> float:

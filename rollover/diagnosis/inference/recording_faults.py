@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import Aside
 from rollover.diagnosis.data.phases import Phases, phases_of, placed, whole
-from rollover.diagnosis.result import Interval, Location, Named, Verdict
+from rollover.diagnosis.result import Interval, Location, Named, Verdict, chance
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, MOST, spoken, units_of
 from rollover.recording import Recording
@@ -102,7 +102,7 @@ def _otherwise(said: str, recordings: int, agree: str) -> str:
 
 
 def _within(p_value: float) -> str:
-    return f"agree within the noise (p = {p_value:.2g})"
+    return f"agree within the noise ({chance(p_value)})"
 
 
 def coarse(dataset: Sequence[Dataset], phases: Sequence[Sequence[tuple[float, str]]]) -> tuple[Location, ...]:
