@@ -87,7 +87,7 @@ def reported(c: Conclusion) -> Diagnosis:
     if is_left:
         said += clock_offset_sentence(clock_outliers(problem, explanation.fitted, asked.executor.parallel_map))
     if recording_fault is None:
-        said += by_share(effects, shares, estimated=c.is_estimated)
+        said += by_share(effects, shares, estimated=c.is_estimated) + hint(c)
     said += offered(law) + inconsistency_sentences(c.inconsistencies) + contradiction_clause(verdict, contrary)
     source = "taught" if is_taught else "estimated" if c.is_estimated else "stated"
     said += tolerance_clause(verdict, explanation.p_value, h_before.scores.get("held_out"), found, source=source)
@@ -172,6 +172,26 @@ def _main_sentence(
         remains=remains,
         cross_validated=c.is_cross_validated,
         beside=c.is_beside and has_model_error,
+    )
+
+
+def hint(c: Conclusion) -> str:
+    """What the sentence goes on with where more effects surely predict half of what a part leaves.
+
+    Together they leave more than noise, or can be bent to too much, so that they were not named.
+    """
+    named = {e.key for e in c.explanation.fitted.effects}
+    more = [e for e in c.tried.fitted.effects if e.key not in named]
+    if c.grade != "part" or not more or not c.explanation.parts:
+        return ""
+    share = share_of(c.problem, c.explanation.fitted, c.problem.again(c.tried.fitted), c.groups)
+    if share is None or share.low < SETTINGS.report.grades.half_share:
+        return ""
+    names = " and ".join(f"{e.id} of {e.channel}" if e.channel else e.id for e in more)
+    predict = "predicts" if len(more) == 1 else "together predict"
+    return (
+        f" Beside it {names} {predict} {share.share:.0%} ({share.low:.0%} to {share.high:.0%}) of what is left: a "
+        "hint, no finding, as what was fitted leaves structure or can be bent to much."
     )
 
 

@@ -346,6 +346,8 @@ def sentence(
             f"{' on recordings that were held out' if cross_validated else ''}."
         )
     said = " ".join(e.statement for e in effects)
+    # beside a background the law of what is missing need not be that of the effect
+    said = f"Of all effects {effects[0].id} comes closest: {said}" if beside else said
     rivals = sorted({r for e in effects for r in e.indistinguishable_from})
     also = (
         "" if cross_validated else " With one recording nothing can be held out: this is the misfit of the fit to it."

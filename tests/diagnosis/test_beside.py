@@ -17,6 +17,7 @@ from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, at_an_en
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.invariants import rejected_effects
+from rollover.diagnosis.reported import hint as hint_of
 from rollover.diagnosis.result import Interval, Named, Share
 from rollover.diagnosis.selection.explanation import Explanation
 from rollover.diagnosis.selection.forward_step import by_chance, confusion_set
@@ -297,3 +298,32 @@ def test_a_coordinate_hard_by_an_end_is_at_it() -> None:
     """A search that ends at a bound stops some 1e-5 of the range before it."""
     assert [at_an_end(x) for x in (0.0, 9e-6, 0.5, 1.0 - 9e-6, 1.0)] == [True, True, False, True, True]
     assert not at_an_end(2e-4)
+
+
+@pytest.mark.parametrize(
+    ("grade", "ids", "left", "hint"),
+    [
+        (
+            "part",
+            ("soil-layer", "mass", "soil-crust"),
+            (0.15, 0.16, 0.14) * 2,
+            "Beside it mass and soil-crust together",
+        ),
+        ("part", ("soil-layer", "mass"), (0.15, 0.16, 0.14) * 2, "Beside it mass predicts 91%"),
+        ("part", ("soil-layer", "mass"), (0.9, 0.05, 0.95) * 2, ""),  # half, not surely
+        ("part", ("soil-layer",), (0.15, 0.16, 0.14) * 2, ""),  # nothing else was tried
+        ("whole", ("soil-layer", "mass"), (0.15, 0.16, 0.14) * 2, ""),
+    ],
+)
+def test_what_would_meet_the_rest_is_a_hint(
+    grade: str, ids: tuple[str, ...], left: tuple[float, ...], hint: str
+) -> None:
+    found = explanation((100.0,) * DROPS, fitted("soil-layer", (1.5,) * DROPS))
+    several = replace(fitted("mass", left), candidates=tuple(fitted(id, left).candidates[0] for id in ids))
+    problem = SimpleNamespace(**vars(PROBLEM), again=lambda f: f)
+    told: Any = SimpleNamespace(
+        explanation=found, tried=replace(found, fitted=several), grade=grade, problem=problem, groups=GROUPS
+    )
+    said = hint_of(told)
+    assert said.strip().startswith(hint) if hint else said == ""
+    assert ("a hint, no finding" in said) == bool(hint)
