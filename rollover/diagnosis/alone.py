@@ -79,12 +79,13 @@ def best_predictor(problem: Problem, one: Step, groups: Groups) -> Fitted:
     """The fit that leads a step: the most probable by (D24) of those that no other surely predicts more than.
 
     Conditions held out tell first. Between what predicts them as well, the squares of all samples would prefer what
-    bends to the one channel that the discrepancy touches least; what is left of each channel counts alike.
+    bends to the one channel that the discrepancy touches least; what is left of each channel counts alike. What leaves
+    more than the discrepancy is refuted by it, where another leaves no more.
     """
     able = [one.fitted, *(f for f in one.rivals if not is_at_bound(f) and f is not one.fitted)]
     ahead = min(able, key=lambda f: held_out(f, groups).chi2.sum())
     level = [f for f in able if f is ahead or not is_behind(problem, one, f, ahead, groups)]
-    return max(level, key=lambda f: log_evidence(problem, f))
+    return max(level, key=lambda f: (is_tolerated(problem, f), log_evidence(problem, f)))
 
 
 def is_behind(problem: Problem, one: Step, rival: Fitted, ahead: Fitted, groups: Groups) -> bool:

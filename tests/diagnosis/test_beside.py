@@ -203,6 +203,20 @@ def test_conditions_tell_what_leads_then_what_is_left(
     assert best_predictor(PROBLEM, one, GROUPS).candidates[-1].id == leads
 
 
+@pytest.mark.parametrize(
+    ("left", "leads"),
+    [
+        (1.9, "sensor-clock-offset"),  # no more than six signals leave by chance, 2.15
+        (2.9, "sensor-lag"),  # the discrepancy refutes both
+    ],
+)
+def test_what_the_discrepancy_refutes_does_not_lead(left: float, leads: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(alone, "log_evidence", lambda _, f: float(f.candidates[-1].id == "sensor-lag"))
+    lag = fitted("sensor-lag", (0.5, 5.5, 0.6, 5.6, 0.4, 5.4))  # no drop foretells which: three better, three worse
+    one = explanation((30.0,) * DROPS, fitted("sensor-clock-offset", (left,) * DROPS), lag).parts[0]
+    assert best_predictor(PROBLEM, one, GROUPS).candidates[-1].id == leads
+
+
 def test_rivals_of_a_family_or_within_the_discrepancy_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(alone, "credible", lambda _, fits: list(fits[:1]))
     best = fitted("soil-layer", (0.5,) * DROPS)
