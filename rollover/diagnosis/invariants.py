@@ -13,6 +13,7 @@ from rollover.diagnosis.fit.cross_validation import Groups, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, is_at_bound
 from rollover.diagnosis.fit.parameterisation import coordinate, physical, strength_parameter
+from rollover.diagnosis.grades import shares
 from rollover.diagnosis.inference.intervals import held_at
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.result import Diagnosis, Named
@@ -40,7 +41,7 @@ def at_bounds(effects: Sequence[Named]) -> set[str]:
 def rejected_effects(
     problem: Problem, found: Explanation, effects: Sequence[Named], groups: Groups, *, in_doubt: bool
 ) -> set[str]:
-    """Ids of effects that are no finding: predicting no better than nothing does, or at a bound and worse than a rival.
+    """Ids of effects that are no finding: predicting no better than without them, or at a bound and worse than a rival.
 
     What is at a bound beside the first effect bends to what the form of that one leaves. Where `in_doubt`, all that are
     at a bound or maybe null. Of an effect alone the misfit itself is asked whether it may be null, slopes only of one
@@ -51,6 +52,10 @@ def rejected_effects(
     after = held_out(found.fitted, groups)
     if after.total >= held_out(found.base, groups).total:
         return {e.id for e in effects}
+    if len(effects) > 1 and not problem.effort.is_ensemble:  # of full runs what a step adds scatters
+        _, each = shares(problem, found, groups)
+        if worse := {key.partition(":")[0] for key, share in each.items() if share.share <= 0.0}:
+            return worse
     if not in_doubt:
         first = found.first
         chi2, rivals = float(after.chi2.sum()), first.rivals if first is not None else ()

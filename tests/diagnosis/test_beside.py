@@ -341,3 +341,21 @@ def test_what_would_meet_the_rest_is_a_hint(
     said = hint_of(told)
     assert said.strip().startswith(hint) if hint else said == ""
     assert ("a hint, no finding" in said) == bool(hint)
+
+
+def test_an_effect_without_which_more_is_predicted_goes() -> None:
+    """A crust leaves 0.4 of what nothing does; a mass beside it 0.3, or 0.5."""
+    crust, mass = fitted("soil-crust", (0.4,) * DROPS), fitted("mass", (0.9,) * DROPS)
+    named = [
+        Named(
+            id=id, kind="physics", channel=None, statement="", parameters={}, p_value=0.0, settings={},
+            indistinguishable_from=(), discriminating_test="",
+        )
+        for id in ("soil-crust", "mass")
+    ]  # fmt: skip
+    for left, rejected in ((0.3, set()), (0.5, {"mass"})):
+        both = replace(fitted("mass", (left,) * DROPS), candidates=(*crust.candidates, *mass.candidates))
+        turned = replace(both, candidates=both.candidates[::-1])
+        steps = Step(base=mass, fitted=turned, p_value=0.0), Step(base=crust, fitted=both, p_value=0.0)
+        found = replace(explanation((1.0,) * DROPS, crust), fitted=both, parts=steps)
+        assert rejected_effects(PROBLEM, found, named, GROUPS, in_doubt=False) == rejected
