@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -70,6 +71,16 @@ class Share:
     share: float
     low: float
     high: float
+
+    def message(self) -> str:
+        """In per cent with its interval, none below nought; nearly all is not said to be all."""
+        share, low, high = (_percent(v) for v in (self.share, self.low, self.high))
+        return f"{share} ({low} to {high})"
+
+
+def _percent(share: float) -> str:
+    share = max(share, 0.0)
+    return f"{math.floor(1e3 * share) / 10.0:.1f}%" if 0.995 <= share < 1.0 else f"{share:.0%}"
 
 
 @dataclass(frozen=True, kw_only=True)

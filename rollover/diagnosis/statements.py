@@ -148,9 +148,8 @@ def by_share(effects: Sequence[Named], scales: Mapping[str, float], *, estimated
     said = ""
     for e in found:
         assert e.explains is not None
-        share, low, high = (max(v, 0.0) for v in (e.explains.share, e.explains.low, e.explains.high))
         nuance = "; in another form, or beside more" if e.answer == "likeness" and scales else ""
-        said += f" {e.id} explains {share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch{nuance}."
+        said += f" {e.id} explains {e.explains.message()} of the held-out mismatch{nuance}."
     if found and scales:
         how = "estimated" if estimated else "allowed for"
         said += f" A background was {how} beside it (1 sigma, of the range: {background(scales)})."
@@ -173,9 +172,7 @@ def usual_model_error_sentence(
     if best is not None and best[1].low > 0.0:
         candidate, found = best
         of = f" of {candidate.channel}" if candidate.channel else ""
-        some = (
-            f" Part of it is predicted by {candidate.id}{of}: {found.share:.0%} ({found.low:.0%} to {found.high:.0%})."
-        )
+        some = f" Part of it is predicted by {candidate.id}{of}: {found.message()}."
     how, most = ("a taught", "the references miss") if taught else ("an estimated", "models usually miss")
     least = "surely predicts some" if taught else "predicts half"
     return (

@@ -46,7 +46,7 @@ class SoilViscousDamping(Effect):
         "Ye 2006 eq (1); half-space c = 3.4 r0^2 sqrt(rho G)/(1 - nu) gives 1.1-3.0 kN s/m for G 5-40 MPa (recalled); "
         "J of Smith's law 0.5-0.65 s/m (recalled, fairly sure)"
     )
-    sentence = "The ground resists in proportion to the speed: {damping} on 63 cm2, with exponent {exponent}."
+    sentence = "The ground resists in proportion to the speed: {damping} on 63 cm2."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-inertial-drag": "drops over a range of speeds of 4 to 1 or more: v against v^2",
         "soil-rate-hardening": "a slow press test: damping vanishes with v, hardening scales with the force",
@@ -67,6 +67,13 @@ class SoilViscousDamping(Effect):
     becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {
         "soil-inertial-drag": {"coefficient": ("damping", 2.0 / (USUAL_DENSITY * REFERENCE_AREA))}  # at zeta 2
     }
+
+    def wording(self) -> str:
+        """Of d v^zeta at another zeta, d is what it amounts to for each m/s at 1 m/s."""
+        said = super().wording()
+        if said is not self.sentence or self.exponent == 1.0:
+            return said
+        return "The ground resists with the speed to the power {exponent}: {damping} on 63 cm2 at 1 m/s."
 
     def places(self) -> Mapping[int, float]:
         """D and zeta, J."""

@@ -14,11 +14,13 @@ from rollover.diagnosis.asked import finding_lines
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import drop_phases
 from rollover.diagnosis.fit.cross_validation import HeldOutMisfit
+from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.inference.scores import misfit_before_impact
 from rollover.diagnosis.noise.ensemble import HeavyTail
-from rollover.diagnosis.result import Interval, Named, Score
+from rollover.diagnosis.prepared import prepared
+from rollover.diagnosis.result import Interval, Named, Score, Share
 from rollover.diagnosis.statements import sentence
 from rollover.effects import EFFECTS, units_of
 from rollover.effects.sensor import SensorBias, SensorClipping
@@ -32,6 +34,19 @@ def test_a_limit_and_an_offset_are_in_the_unit_of_their_channel() -> None:
     assert "1,000 N:" in SensorClipping(channel=FORCE, limit=999.7).statement()
     assert units_of(EFFECTS["sensor-bias"], ACCELERATION)["bias"] == "m/s2"
     assert units_of(EFFECTS["soil-layer"])["depth"] == "m"
+
+
+def test_nearly_all_is_not_said_to_be_all() -> None:
+    assert Share(share=0.9986, low=0.9969, high=1.0).message() == "99.8% (99.6% to 100%)"
+    assert Share(share=0.942, low=-0.3, high=0.99999).message() == "94% (0% to 99.9%)"
+
+
+@pytest.mark.parametrize(("rate", "said"), [(1000.0, ()), (5000.0, ("means of 3 neighbouring samples",))])
+def test_means_of_samples_are_said_to_be_compared(rate: float, said: tuple[str, ...]) -> None:
+    """Of 0.35 s at 5 kHz are 1,750 samples, by threes no fewer than 500 rows."""
+    _, notes = prepared(scenario(), recorded({}, noise=0.02, rate=rate, until=0.35), Executor())
+    assert ["means of" in n for n in notes] == [True] * len(said)
+    assert all(part in n for part, n in zip(said, notes, strict=True))
 
 
 def test_phases_need_no_depth_gauge() -> None:
