@@ -70,10 +70,8 @@ class SoilViscousDamping(Effect):
 
     def wording(self) -> str:
         """Of d v^zeta at another zeta, d is what it amounts to for each m/s at 1 m/s."""
-        said = super().wording()
-        if said is not self.sentence or self.exponent == 1.0:
-            return said
-        return "The ground resists with the speed to the power {exponent}: {damping} on 63 cm2 at 1 m/s."
+        by_power = "The ground resists with the speed to the power {exponent}: {damping} on 63 cm2 at 1 m/s."
+        return super().wording() if self.proportion or self.exponent == 1.0 else by_power
 
     def places(self) -> Mapping[int, float]:
         """D and zeta, J."""
@@ -138,8 +136,7 @@ class SoilRateHardening(Effect):
     def places(self) -> Mapping[int, float]:
         """Lambda, v_0, beta, and where that ends."""
         slowest = self.reference_speed if self.slowest is None else self.slowest
-        by_power = {k.POWER: self.power, k.SLOWEST: slowest}
-        return {k.PER_DECADE: self.per_decade, k.SLOW: self.reference_speed, **by_power}
+        return {k.PER_DECADE: self.per_decade, k.SLOW: self.reference_speed, k.POWER: self.power, k.SLOWEST: slowest}
 
 
 @parameters
