@@ -16,6 +16,7 @@ from rollover.diagnosis.data.condition_uncertainty import with_rounding_uncertai
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import Aside, find_inconsistencies, without_inconsistent, wrong_conditions
 from rollover.diagnosis.data.onset import clock_notes, with_clock_zeros
+from rollover.diagnosis.data.repeatability import without_copies
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
@@ -81,11 +82,12 @@ def diagnose(
     executor = executor or Executor()
     if posterior and unfit(scenario):
         raise ValueError("posterior: of drops only, got an overturn; 0 draws, or those of a calibration")
+    recordings, copies = without_copies(recordings, {*hold_out, *reference})
     recordings, zeros = with_clock_zeros(scenario, [(name, continuous(r)) for name, r in recordings])
     is_drop = isinstance(scenario.vehicle, Striker)  # what small errors do to an overturn is ensemble scatter
     recordings, rounded = with_rounding_uncertainty(recordings) if is_drop else (recordings, [])
     every, notes = prepared(scenario, recordings, executor)
-    notes += [*clock_notes(scenario, recordings, zeros), *rounded]
+    notes += [*copies, *clock_notes(scenario, recordings, zeros), *rounded]
     exact = every  # beside noise alone, whatever is tolerated
     every = [replace(e, model_error=float(np.hypot(e.model_error, general))) for e in every]
     asked = Asked(

@@ -220,7 +220,13 @@ def _with_next_test(c: Conclusion) -> tuple[Named, ...]:
     if c.asked.scenario is None or len(c.effects) != 1 or c.recording_fault is not None or not c.explanation.parts:
         return c.effects
     (effect,), step = c.effects, c.explanation.parts[0]
-    rivals = [f for f in step.rivals if f.candidates[-1].id in effect.indistinguishable_from]
+    # what does the very same at other values no drop tells from it, though that effect by itself would be told
+    same = EFFECTS[effect.id](**effect.settings).same_as()
+    rivals = [
+        f
+        for f in step.rivals
+        if f.candidates[-1].id in effect.indistinguishable_from and f.candidates[-1].id not in same
+    ]
     if len(effect.indistinguishable_from) != 1 or not rivals or len(c.explanation.fitted.candidates) != 1:
         return c.effects
     found = next_test(c.asked.scenario, c.problem.dataset, c.explanation.fitted, min(rivals, key=lambda f: f.chi2))

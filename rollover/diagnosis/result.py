@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -76,6 +77,21 @@ class Share:
     share: float
     low: float
     high: float
+
+    def message(self, *, alone: bool = True) -> str:
+        """In per cent with its interval, none below nought; nearly all is not said to be all, nor a little nothing.
+
+        Of one of several effects, not `alone`, it is what it explains beyond the others: these need not add up to all.
+        """
+        share, low, high = (_percent(v) for v in (self.share, self.low, self.high))
+        return f"{share} ({low} to {high}) of the held-out mismatch{'' if alone else ', beyond the others'}"
+
+
+def _percent(share: float) -> str:
+    share = max(share, 0.0)
+    if 0.0 < share < 0.005:
+        return "below 0.5%"
+    return f"{math.floor(1e3 * share) / 10.0:.1f}%" if 0.995 <= share < 1.0 else f"{share:.0%}"
 
 
 @dataclass(frozen=True, kw_only=True)

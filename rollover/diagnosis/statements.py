@@ -62,7 +62,6 @@ def named(
         rivals = [r for r in (f.candidates[-1] for f in near) if r.key not in settings]
         effect = kind(**values)
         same = {id: said for id, said in effect.same_as().items() if id not in settings}
-        tests = [kind.rivals[id] for id in (*(r.id for r in rivals), *same) if id in kind.rivals]
         effects.append(
             Named(
                 id=c.id,
@@ -73,11 +72,20 @@ def named(
                 channel=c.channel,
                 p_value=own.p_value,
                 indistinguishable_from=tuple(dict.fromkeys([*(r.id for r in rivals if r.id != c.id), *same])),
-                discriminating_test=tests[0] if tests else next(iter(kind.rivals.values()), ""),
+                discriminating_test=discriminating_test(c.key, [*(r.key for r in rivals), *same]),
             )
         )
     first = strongest(problem, found.base, fitted)
     return tuple(sorted(effects, key=lambda n: (n.id, n.channel) != (first.id, first.channel)))
+
+
+def discriminating_test(key: str, rivals: Sequence[str]) -> str:
+    """The test that tells an effect from the first of its rivals (keys) that either lists; without, the usual one's."""
+    id = key.partition(":")[0]
+    known, others = EFFECTS[id].rivals, [r.partition(":")[0] for r in rivals]
+    listed = (known.get(other) or EFFECTS[other].rivals.get(id) for other in others)
+    planned = f"what `rollover plan SCENARIO --between {key},{rivals[0]}` advises" if rivals else ""
+    return next(filter(None, listed), planned or next(iter(known.values()), ""))
 
 
 def _clock_ambiguity(problem: Problem, c: Candidate, values: Mapping[str, Any]) -> list[str]:
@@ -153,9 +161,8 @@ def by_share(effects: Sequence[Named], scales: Mapping[str, float], *, estimated
     said = ""
     for e in found:
         assert e.explains is not None
-        share, low, high = (max(v, 0.0) for v in (e.explains.share, e.explains.low, e.explains.high))
         nuance = "; its law may have another form, or more is missing" if e.answer == "likeness" and scales else ""
-        said += f" {e.id} explains {share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch{nuance}."
+        said += f" {e.id} explains {e.explains.message(alone=len(effects) == 1)}{nuance}."
     if found and scales:
         how = "estimated" if estimated else "allowed for"
         said += f" A background was {how} beside it (standard deviation as a share of the range: {background(scales)})."
@@ -178,9 +185,7 @@ def usual_model_error_sentence(
     if best is not None and best[1].low > 0.0:
         candidate, found = best
         of = f" of {candidate.channel}" if candidate.channel else ""
-        some = (
-            f" Part of it is predicted by {candidate.id}{of}: {found.share:.0%} ({found.low:.0%} to {found.high:.0%})."
-        )
+        some = f" Part of it is predicted by {candidate.id}{of}: {found.message()}."
     how, most = ("a", "the references show") if taught else ("an estimated", "models usually miss")
     least = "surely predicts some" if taught else "predicts half"
     return (

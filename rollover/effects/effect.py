@@ -144,17 +144,20 @@ class Effect:
         """Ids of other effects beside which it does the very same at other values, and the sentence that says so."""
         return {}
 
-    def statement(self) -> str:
-        """The sentence, with the values in it; that of its form, if it is in one that has a sentence of its own."""
+    def wording(self) -> str:
+        """The sentence for its values; that of its form, if it is in one that has a sentence of its own."""
         own = (f for f in self.forms if f.sentence and all(getattr(self, n) == v for n, v in f.fixed.items()))
-        sentence = next((f.sentence for f in own), self.sentence)
+        return next((f.sentence for f in own), self.sentence)
+
+    def statement(self) -> str:
+        """The sentence, with the values in it."""
         units = units_of(type(self), getattr(self, "channel", None))
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         spoken = {
             name: _Spoken(value, units[name]) if isinstance(value, float) and name in units else value
             for name, value in values.items()
         }
-        return sentence.format(**spoken)
+        return self.wording().format(**spoken)
 
 
 class _Spoken:

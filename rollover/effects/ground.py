@@ -46,7 +46,7 @@ class SoilViscousDamping(Effect):
         "Ye 2006 eq (1); half-space c = 3.4 r0^2 sqrt(rho G)/(1 - nu) gives 1.1-3.0 kN s/m for G 5-40 MPa (recalled); "
         "J of Smith's law 0.5-0.65 s/m (recalled, fairly sure)"
     )
-    sentence = "The ground resists in proportion to the speed: {damping} on 63 cm2, with exponent {exponent}."
+    sentence = "The ground resists in proportion to the speed: {damping} on 63 cm2."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-inertial-drag": "drops over a range of speeds of 4 to 1 or more: v against v^2",
         "soil-rate-hardening": "a slow press test: damping vanishes with v, hardening scales with the force",
@@ -67,6 +67,11 @@ class SoilViscousDamping(Effect):
     becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {
         "soil-inertial-drag": {"coefficient": ("damping", 2.0 / (USUAL_DENSITY * REFERENCE_AREA))}  # at zeta 2
     }
+
+    def wording(self) -> str:
+        """Of d v^zeta at another zeta, d is what it amounts to for each m/s at 1 m/s."""
+        by_power = "The ground resists with the speed to the power {exponent}: {damping} on 63 cm2 at 1 m/s."
+        return super().wording() if self.proportion or self.exponent == 1.0 else by_power
 
     def places(self) -> Mapping[int, float]:
         """D and zeta, J."""
@@ -131,8 +136,7 @@ class SoilRateHardening(Effect):
     def places(self) -> Mapping[int, float]:
         """Lambda, v_0, beta, and where that ends."""
         slowest = self.reference_speed if self.slowest is None else self.slowest
-        by_power = {k.POWER: self.power, k.SLOWEST: slowest}
-        return {k.PER_DECADE: self.per_decade, k.SLOW: self.reference_speed, **by_power}
+        return {k.PER_DECADE: self.per_decade, k.SLOW: self.reference_speed, k.POWER: self.power, k.SLOWEST: slowest}
 
 
 @parameters

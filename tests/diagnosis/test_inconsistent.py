@@ -13,6 +13,7 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data import inconsistent as slipping
 from rollover.diagnosis.data.inconsistent import Inconsistency, find_inconsistencies
+from rollover.diagnosis.data.repeatability import without_copies
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.prepared import prepared
 from rollover.recording import Recording
@@ -135,3 +136,27 @@ def test_a_scale_is_never_negative(channel: str, factor: float, shared: bool) ->
     found = [Inconsistency(dataset=e, signal=e.signals[0], factor=factor, cause="such") for e in every]
     assert slipping._is_shared(found[0], found, every) is shared
     assert not slipping._is_shared(found[0], found[:1], every)
+
+
+def test_a_copy_of_a_recording_is_no_second_test() -> None:
+    drops = recorded({}, noise=0.02)
+    name, first = drops[0]
+    found, lines = without_copies([*drops, ("again", first)])
+    assert [n for n, _ in found] == [n for n, _ in drops]
+    assert lines == [f"again: holds the very samples of {name}: a copy, not a second test; it was excluded"]
+    answer = diagnose(scenario(), [*drops, ("again", first)])
+    assert answer.training == tuple(n for n, _ in drops)
+    assert lines[0] in answer.notes
+
+
+def test_a_copy_that_is_asked_for_or_states_otherwise_stays() -> None:
+    drops = recorded({}, noise=0.02)
+    found, lines = without_copies([*drops, ("again", drops[0][1])], ("again",))
+    assert "again" in dict(found)
+    assert lines[0].endswith("one test counts twice")
+    other = replace(drops[0][1], conditions={"initiation.speed": 2.5})
+    found, lines = without_copies([*drops, ("again", other)])
+    assert "again" in dict(found)
+    assert lines[0].endswith("one of the two was not made as it states")
+    louder = {**drops[0][1].channels, FORCE: drops[0][1][FORCE] + 1.0}
+    assert without_copies([*drops, ("again", replace(drops[0][1], channels=louder))])[1] == []

@@ -9,17 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis import statements
+from rollover.diagnosis import reported, statements
 from rollover.diagnosis.asked import finding_lines
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import drop_phases
 from rollover.diagnosis.fit.cross_validation import HeldOutMisfit
+from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.inference.scores import misfit_before_impact
 from rollover.diagnosis.noise.ensemble import HeavyTail
-from rollover.diagnosis.result import Interval, Named, Score
-from rollover.diagnosis.statements import sentence
+from rollover.diagnosis.prepared import prepared
+from rollover.diagnosis.result import Interval, Named, NextTest, Score, Share
+from rollover.diagnosis.statements import discriminating_test, sentence
 from rollover.effects import EFFECTS, units_of
 from rollover.effects.sensor import SensorBias, SensorClipping
 from rollover.recording.checks import Finding
@@ -32,6 +34,64 @@ def test_a_limit_and_an_offset_are_in_the_unit_of_their_channel() -> None:
     assert "1,000 N:" in SensorClipping(channel=FORCE, limit=999.7).statement()
     assert units_of(EFFECTS["sensor-bias"], ACCELERATION)["bias"] == "m/s2"
     assert units_of(EFFECTS["soil-layer"])["depth"] == "m"
+
+
+def test_nearly_all_is_not_said_to_be_all() -> None:
+    assert Share(share=0.9986, low=0.9969, high=1.0).message().startswith("99.8% (99.6% to 100%) of")
+    assert Share(share=0.942, low=-0.3, high=0.99999).message().startswith("94% (0% to 99.9%) of")
+    little = Share(share=0.0004, low=-0.0001, high=0.02)
+    assert little.message(alone=False) == "below 0.5% (0% to 2%) of the held-out mismatch, beyond the others"
+
+
+@pytest.mark.parametrize(("rate", "said"), [(1000.0, ()), (5000.0, ("means of 3 neighbouring samples",))])
+def test_means_of_samples_are_said_to_be_compared(rate: float, said: tuple[str, ...]) -> None:
+    """Of 0.35 s at 5 kHz are 1,750 samples, by threes no fewer than 500 rows."""
+    _, notes = prepared(scenario(), recorded({}, noise=0.02, rate=rate, until=0.35), Executor())
+    assert ["means of" in n for n in notes] == [True] * len(said)
+    assert all(part in n for part, n in zip(said, notes, strict=True))
+
+
+@pytest.mark.parametrize(("reference_speed", "is_planned"), [(0.05, False), (0.01, True)])
+def test_no_drop_is_advised_for_what_no_drop_tells(
+    reference_speed: float, is_planned: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A rate law at another v_0 is the usual one on softer ground: the ground's stiffness alone is no rival of it."""
+    values = {"per_decade": 0.2, "reference_speed": reference_speed}
+    effect = Named(
+        id="soil-rate-hardening",
+        kind="physics",
+        statement="",
+        parameters={},
+        settings=values,
+        channel=None,
+        p_value=0.0,
+        indistinguishable_from=("soil-stiffness",),
+        discriminating_test="",
+    )
+    rival = SimpleNamespace(candidates=[SimpleNamespace(id="soil-stiffness")], chi2=1.0)
+    explanation = SimpleNamespace(
+        parts=[SimpleNamespace(rivals=[rival])], fitted=SimpleNamespace(candidates=[SimpleNamespace()])
+    )
+    concluded: Any = SimpleNamespace(
+        asked=SimpleNamespace(scenario=scenario()),
+        effects=(effect,),
+        recording_fault=None,
+        explanation=explanation,
+        problem=SimpleNamespace(dataset=[]),
+    )
+    advice = NextTest(path="initiation.speed", value=1.4, unit="m/s", channels=(FORCE,), rate=1e3, probability=1.0)
+    monkeypatch.setattr(reported, "next_test", lambda *_: advice)
+    (found,) = reported._with_next_test(concluded)
+    assert (found.next_test is not None) is is_planned
+
+
+def test_a_discriminating_test_is_that_of_the_rival() -> None:
+    """Not that of another look-alike, where none is listed for the two."""
+    bias = f"sensor-bias:{ACCELERATION}"
+    assert discriminating_test(bias, []) == EFFECTS["sensor-bias"].rivals["sensor-gain"]
+    assert discriminating_test(bias, ["soil-adhesion"]) == EFFECTS["sensor-bias"].rivals["soil-adhesion"]
+    assert discriminating_test("slope", ["ground-friction"]) == EFFECTS["ground-friction"].rivals["slope"]
+    assert f"--between {bias},air-drag`" in discriminating_test(bias, ["air-drag"])
 
 
 def test_phases_need_no_depth_gauge() -> None:

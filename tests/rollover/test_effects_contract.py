@@ -321,6 +321,9 @@ def test_the_listing_shows_what_each_effect_is() -> None:
         ("sensor-clock-offset", {"channel": "ground/sinkage", "offset": -0.002}, "comes 0.002 s early."),
         ("sensor-bias", {"channel": "ground/sinkage", "bias": -0.003}, "reads 0.003 m too little throughout."),
         ("mass", {"added": 30.0}, "is 30 kg more than stated."),
+        ("soil-viscous-damping", {"damping": 1500.0}, "in proportion to the speed: 1,500 N s/m on 63 cm2."),
+        ("soil-viscous-damping", {"damping": 339.0, "exponent": 0.5}, "power 0.5: 339 N s/m on 63 cm2 at 1 m/s."),
+        ("soil-viscous-damping", {"damping": 0.0, "proportion": 0.2}, "by 0.2 s/m of what it does at rest."),
     ],
 )
 def test_a_sentence_says_which_way_and_by_how_much(id: str, values: dict[str, Any], said: str) -> None:

@@ -138,11 +138,10 @@ def diagnosis(found: Diagnosis, folder: str) -> None:
             rated = f", ISO 18571 {a.iso18571:.3f} -> {b.iso18571:.3f}"
         title = "fitted" if which == "training" else "held out"
         out.print(f"{title}: misfit over noise {a.nrmse:.3g} -> {b.nrmse:.3g}{rated} ({', '.join(names)})")
+    shares = sum(e.explains is not None for e in found.effects)
     for e in found.effects:
         if e.explains is not None:
-            low, high = max(e.explains.low, 0.0), e.explains.high
-            stated = f"{e.explains.share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch"
-            out.print(f"{e.id}: {e.answer}, {stated}")
+            out.print(f"{e.id}: {e.answer}, {e.explains.message(alone=shares == 1)}")
         if e.indistinguishable_from:
             out.print(f"{e.id} or {', '.join(e.indistinguishable_from)}? Measure next: {e.discriminating_test}")
         if e.next_test is not None:

@@ -7,7 +7,7 @@ is given the median scatter of the others, as a share of the range.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -16,9 +16,42 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, condition_groups
 from rollover.diagnosis.settings import SETTINGS
+from rollover.recording import Recording
 
 Array = NDArray[np.float64]
 TUNING = SETTINGS.data.repeatability
+
+
+def without_copies(
+    recordings: Sequence[tuple[str, Recording]], kept: Collection[str] = ()
+) -> tuple[list[tuple[str, Recording]], list[str]]:
+    """Recordings (by name) without those that hold the very samples of an earlier one, and a line on each.
+
+    A copy is no second test. One in `kept`, or that states other conditions, stays, and that is said.
+    """
+    found: list[tuple[str, Recording]] = []
+    lines = []
+    for name, one in recordings:
+        first = next(((n, r) for n, r in found if _holds_the_same(one, r)), None)
+        if first is None:
+            found.append((name, one))
+            continue
+        as_stated = dict(first[1].conditions) == dict(one.conditions)
+        if as_stated and name not in kept:
+            end = "a copy, not a second test; it was excluded"
+        else:
+            end = "one test counts twice" if as_stated else "one of the two was not made as it states"
+            found.append((name, one))
+        lines.append(f"{name}: holds the very samples of {first[0]}: {end}")
+    return found, lines
+
+
+def _holds_the_same(one: Recording, other: Recording) -> bool:
+    return (
+        one.channels.keys() == other.channels.keys()
+        and np.array_equal(one.time, other.time)
+        and all(np.array_equal(one[c], other[c], equal_nan=True) for c in one.channels)
+    )
 
 
 def with_scatter(found: Sequence[Dataset]) -> list[Dataset]:
