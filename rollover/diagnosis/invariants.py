@@ -12,7 +12,7 @@ from rollover.diagnosis.data.phases import Phases
 from rollover.diagnosis.fit.cross_validation import Groups, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, is_at_bound
-from rollover.diagnosis.fit.parameterisation import coordinate, physical, strength_parameter
+from rollover.diagnosis.fit.parameterisation import coordinate, physical, strength_parameter, with_slices
 from rollover.diagnosis.grades import shares
 from rollover.diagnosis.inference.intervals import held_at
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
@@ -35,6 +35,16 @@ def at_bounds(effects: Sequence[Named]) -> set[str]:
         e.id
         for e in effects
         if any(i.at_bound for name, i in e.parameters.items() if name not in EFFECTS[e.id].secondary)
+    }
+
+
+def hard_by_bounds(fitted: Fitted) -> set[str]:
+    """Ids of effects whose strength ended hard by an end of its range, where a search that is led there stops."""
+    return {
+        c.id
+        for c, own in with_slices(fitted.candidates)
+        for name, x in zip(c.search, fitted.x[own], strict=True)
+        if name not in EFFECTS[c.id].secondary and not TUNING.hard_by < x < 1.0 - TUNING.hard_by
     }
 
 
@@ -61,7 +71,8 @@ def rejected_effects(
         chi2, rivals = float(after.chi2.sum()), first.rivals if first is not None else ()
         better = any(not is_at_bound(f) and float(held_out(f, groups).chi2.sum()) < chi2 for f in rivals)
         leads = effects[0].id if first is None or len(effects) == 1 else first.fitted.candidates[-1].id
-        return at_bounds(effects) - (set() if better else {leads})
+        beside = (hard_by_bounds(found.fitted) & {e.id for e in effects}) - {leads}
+        return beside | (at_bounds(effects) if better else set())
     null = {e.id for e in effects if may_be_null(e)}
     if len(effects) == 1 and null and is_clear_of_null(problem, found.fitted):
         null = set()

@@ -58,7 +58,7 @@ def prepared(
     found = with_variance_model(with_quantisation(found, read))
     if many := sorted({e.averaged for e in found if e.averaged > 1}):
         said = " or ".join(map(str, many))
-        notes.append(f"compared are means of {said} neighbouring samples: misfits and noise are stated over theirs")
+        notes.append(f"means of {said} neighbouring samples are compared: misfits and noise are those of the means")
     louder = {s.channel: float(s.level.max()) for e in found for s in e.signals if s.level is not None}
     notes += [f"{c}: the noise grows with the value, to {most:.1f} times its least" for c, most in louder.items()]
     steps = {s.channel: s.step for e in found for s in e.signals if s.step > 0.0}

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.calibration.posterior import Posterior
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording.time_stamps import Zero
 from rollover.system.notebook import card
 
@@ -20,7 +21,7 @@ Verdict = Literal["no-mismatch", "parameter", "sensor", "missing-physics", "unex
 Estimate = bool | Literal["unexplained"]
 
 Answer = Literal["nothing", "immaterial", "whole", "part", "likeness", "unexplained", "cannot-tell"]
-LEAST_P_VALUE = 1e-12  # below it a tail of chi-square says nothing of recordings; chosen
+LEAST_P_VALUE = SETTINGS.report.statements.least_p_value
 
 
 def chance(p_value: float) -> str:

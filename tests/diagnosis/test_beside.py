@@ -13,7 +13,7 @@ import pytest
 from rollover.diagnosis import alone
 from rollover.diagnosis.alone import alike_beside, best_predictor, times_shown, verdict_on_single_effect
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, at_an_end
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.invariants import rejected_effects
@@ -284,34 +284,31 @@ def test_a_part_surely_predicted_is_named_within_the_tolerance(low: float, is_es
 
 
 @pytest.mark.parametrize(
-    ("at_bound", "ids", "rival", "rejected"),
+    ("x", "rival", "rejected"),
     [
-        ("sensor-clock-drift", ("soil-layer", "sensor-clock-drift"), 0.9, {"sensor-clock-drift"}),
-        ("soil-layer", ("soil-layer", "sensor-clock-drift"), 0.9, set()),  # the first, and nothing is better
-        ("soil-layer", ("soil-layer",), 0.9, set()),
-        ("soil-layer", ("soil-layer", "sensor-clock-drift"), 0.1, {"soil-layer"}),
-        ("soil-crust", ("soil-crust",), 0.9, set()),  # all there is, in the first one's place
+        ((0.5, 0.99999), 0.9, {"sensor-clock-drift"}),  # a search that is led to a bound stops some 1e-5 before it
+        ((0.5, 0.9), 0.9, set()),
+        ((1.0, 0.9), 0.9, set()),  # the first, and nothing is better
+        ((1.0, 0.9), 0.1, {"soil-layer"}),
+        ((1.0,), 0.9, set()),
     ],
 )
 def test_beside_the_first_no_effect_may_stand_at_a_bound(
-    at_bound: str, ids: tuple[str, ...], rival: float, rejected: set[str]
+    x: tuple[float, ...], rival: float, rejected: set[str]
 ) -> None:
-    found = explanation(SOME, fitted("soil-layer", (0.2,) * DROPS), fitted("guide-friction", (rival,) * DROPS))
+    layer, drift = fitted("soil-layer", (0.2,) * DROPS), fitted("sensor-clock-drift", (0.2,) * DROPS)
+    found = explanation(SOME, layer, fitted("guide-friction", (rival,) * DROPS))
+    candidates = (*layer.candidates, *drift.candidates)[: len(x)]
+    found = replace(found, fitted=replace(layer, candidates=candidates, x=x))
     effects = [
         Named(
-            id=id, kind="physics", channel=None, statement="", p_value=0.0, indistinguishable_from=(), settings={},
+            id=c.id, kind="physics", channel=None, statement="", p_value=0.0, indistinguishable_from=(), settings={},
             discriminating_test="",
-            parameters={"strength": Interval(value=1.0, low=0.9, high=1.1, unit="1", at_bound=id == at_bound)},
+            parameters={"strength": Interval(value=1.0, low=0.9, high=1.1, unit="1", at_bound=at == 1.0)},
         )
-        for id in ids
+        for c, at in zip(candidates, x, strict=True)
     ]  # fmt: skip
     assert rejected_effects(PROBLEM, found, effects, GROUPS, in_doubt=False) == rejected
-
-
-def test_a_coordinate_hard_by_an_end_is_at_it() -> None:
-    """A search that ends at a bound stops some 1e-5 of the range before it."""
-    assert [at_an_end(x) for x in (0.0, 9e-6, 0.5, 1.0 - 9e-6, 1.0)] == [True, True, False, True, True]
-    assert not at_an_end(2e-4)
 
 
 @pytest.mark.parametrize(
@@ -354,7 +351,7 @@ def test_an_effect_without_which_more_is_predicted_goes() -> None:
         for id in ("soil-crust", "mass")
     ]  # fmt: skip
     for left, rejected in ((0.3, set()), (0.5, {"mass"})):
-        both = replace(fitted("mass", (left,) * DROPS), candidates=(*crust.candidates, *mass.candidates))
+        both = replace(fitted("mass", (left,) * DROPS), candidates=(*crust.candidates, *mass.candidates), x=(0.5, 0.5))
         turned = replace(both, candidates=both.candidates[::-1])
         steps = Step(base=mass, fitted=turned, p_value=0.0), Step(base=crust, fitted=both, p_value=0.0)
         found = replace(explanation((1.0,) * DROPS, crust), fitted=both, parts=steps)

@@ -61,7 +61,7 @@ def explanation_of(count: int, p_value: float) -> Explanation:
 @pytest.fixture
 def judged(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
     """Held-out misfit by label; everything that is left matters."""
-    misfits = {"as it is": 20.0, "soil-crust": 3.5}
+    misfits = {"the scenario as it is": 20.0, "soil-crust": 3.5}
     monkeypatch.setattr(decision, "matters", lambda *_: True)
     monkeypatch.setattr(decision, "is_tolerated", lambda *_: False)
     monkeypatch.setattr(decision, "strongest", lambda *one: one[2].candidates[0])
@@ -208,7 +208,7 @@ def test_an_effect_that_hardly_predicts_better_is_not_named(
     start: float, ahead: float, named: int, judged: dict[str, float]
 ) -> None:
     """Whatever it leaves of those that it was fitted to."""
-    judged |= {"as it is": start, "soil-crust": ahead}
+    judged |= {"the scenario as it is": start, "soil-crust": ahead}
     found, verdict = verdict_on(
         cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation_of(1, 0.4), [], []
     )

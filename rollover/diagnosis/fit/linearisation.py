@@ -173,7 +173,7 @@ def time_shift_step(block: ResidualBlock, dx: Array) -> float:
 
 def at_an_end(x: float) -> bool:
     """Whether a coordinate ended at an end of its range."""
-    return not TUNING.end < x < 1.0 - TUNING.end
+    return not 1e-6 < x < 1.0 - 1e-6
 
 
 def bounded_step(A: Array, b: Array, x: Array, damping: float) -> Array:

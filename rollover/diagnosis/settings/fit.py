@@ -76,7 +76,6 @@ class Linearisation:
 
     widest_shift: float = 4.0  # standard deviations of the prior: largest time shift; chosen
     weak_prior: float = 1e-4  # 1/variance of a coordinate: keeps undetermined coordinates where they are; chosen
-    end: float = 1e-4  # of a range, from either end: a number anywhere in it alike is there once in 5,000; chosen
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,6 +37,7 @@ class Invariants:
     at_noise: float = 1.05  # misfit over the noise: below it a sentence gives 1.0; rounding to one decimal
     halvings: int = 6  # bisections of the way to an effect's zero; known to a 64th of the way
     rival_share: float = 0.5  # share of the best effect's gain that a rival must have; chosen
+    hard_by: float = 1e-4  # of a range, from either end: a number anywhere in it alike is there once in 5,000; chosen
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +79,7 @@ class Statements:
     # share of a strength: the end of a logarithmic interval is lowered by it in the comparison with none; chosen
     near_zero: float = 0.2
     spelt_out_scales: int = 6  # scales of a background that a sentence spells out; chosen
+    least_p_value: float = 1e-12  # below it a tail of chi-square says nothing of recordings; chosen
 
 
 @dataclass(frozen=True, kw_only=True)
