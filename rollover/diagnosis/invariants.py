@@ -29,23 +29,32 @@ TUNING = SETTINGS.report.invariants
 def at_bounds(effects: Sequence[Named]) -> set[str]:
     """Ids of effects with a number at an end of its range: the search ended there, not the effect.
 
-    A shape that few recordings tell from the strength may lie there.
+    A shape that few recordings tell from the strength may lie there, and the least strength of what acts at that
+    already.
     """
     return {
         e.id
         for e in effects
-        if any(i.at_bound for name, i in e.parameters.items() if name not in EFFECTS[e.id].secondary)
+        if any(i.at_bound and not _may_end(e.id, name, i.value) for name, i in e.parameters.items())
     }
 
 
 def hard_by_bounds(fitted: Fitted) -> set[str]:
-    """Ids of effects whose strength ended hard by an end of its range, where a search that is led there stops."""
+    """The same of a fit, and where a strength ended hard by an end, as a search that is led there does."""
     return {
         c.id
         for c, own in with_slices(fitted.candidates)
-        for name, x in zip(c.search, fitted.x[own], strict=True)
-        if name not in EFFECTS[c.id].secondary and not TUNING.hard_by < x < 1.0 - TUNING.hard_by
+        for (name, search), x in zip(c.search.items(), fitted.x[own], strict=True)
+        if not TUNING.hard_by < x < 1.0 - TUNING.hard_by and not _may_end(c.id, name, physical(x, search))
     }
+
+
+def _may_end(id: str, name: str, value: float) -> bool:
+    """Whether a number of an effect may be at that end of its range: it is a shape, or its least acts all the same."""
+    kind = EFFECTS[id]
+    if name in kind.secondary or not kind.is_discontinuous or name not in kind.search:
+        return name in kind.secondary
+    return coordinate(value, kind.search[name]) < 0.5
 
 
 def rejected_effects(

@@ -103,6 +103,9 @@ def test_loads_are_forces_moments_and_what_tells_them() -> None:
 def test_a_value_at_a_bound_is_no_result_but_a_shape_may_be() -> None:
     assert at_bounds([effect(at_bound=True), effect("mass", "added")]) == {"soil-viscous-damping"}
     assert at_bounds([effect(name="exponent", at_bound=True)]) == set()
+    # the least adhesion holds what moves along on the face, the largest is where the search ended
+    assert at_bounds([effect("soil-adhesion", "stress", value=500.0, at_bound=True)]) == set()
+    assert at_bounds([effect("soil-adhesion", "stress", value=2e5, at_bound=True)]) == {"soil-adhesion"}
 
 
 @pytest.mark.parametrize(
