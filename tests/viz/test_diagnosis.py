@@ -33,7 +33,7 @@ def test_the_page_of_a_finding() -> None:
     assert "at the end of its range" in row[7]
     assert "predicts the held-out recordings no better than soil-stiffness: it may be any of these" in said
     assert "Measure next: weigh the striker at rest." in said
-    assert "Structure remains in the misfit (probability 1e-06)." in said
+    assert "Structure remains in the misfit (p = 1e-06)." in said
     assert ["one", FORCE, "loading", "0.0050", "0.1000", "70.0", "speed"] in parts.rows
     assert ["speed", "90"] in parts.rows
     assert ["time", "0"] in parts.rows  # worse than nothing is nothing

@@ -8,7 +8,7 @@ from typing import Any
 
 from rollover.diagnosis import Diagnosis
 from rollover.diagnosis.overlay import Overlay, Track
-from rollover.diagnosis.result import Location, Score
+from rollover.diagnosis.result import Location, Score, chance
 from rollover.effects import effects
 from rollover.recording.checks import Finding
 from rollover.scenario import Scenario
@@ -77,7 +77,7 @@ def _found(found: Diagnosis) -> list[Block]:
         numeric=(3, 4, 5),
         caption="95 % intervals, SI. The scenario with these values stands in scenario-diagnosed.yaml.",
     )
-    notes: list[Block] = [Note(text=f"{e.statement} ({_chance(e.p_value)})") for e in found.effects]
+    notes: list[Block] = [Note(text=f"{e.statement} ({chance(e.p_value)})") for e in found.effects]
     sections: list[Block] = [Section(title="What was found", blocks=[*notes, table])]
     if (d := found.posterior) is not None:
         prior = "Prior: uniform over the range of the search, of the logarithm where that is looked for."
@@ -113,7 +113,7 @@ def _where(found: Diagnosis, overlays: Sequence[Overlay], each: Each) -> list[Bl
         )
         blocks.append(table)
     if found.remaining_significant:
-        text = f"Structure remains in the misfit ({_chance(found.remaining_p_value)})."
+        text = f"Structure remains in the misfit ({chance(found.remaining_p_value)})."
         blocks.append(Note(text=text, warning=True))
         if found.remaining_where and found.effects:
             blocks.append(_locations(found.remaining_where, "Share of the misfit that remains."))
@@ -296,7 +296,7 @@ def _basis(found: Diagnosis, overlays: Sequence[Overlay]) -> Section:
         noise.append([channel, _g(sigma * s.factor, 3), s.unit])
     shifts: list[Row] = [[t.recording, f"{1e3 * t.shift:+.3f}"] for t in overlays]
     blocks: list[Block] = [
-        Note(text=f"Noise alone leaves such a misfit with {_chance(found.p_value)}."),
+        Note(text=f"Noise alone leaves such a misfit with {chance(found.p_value)}."),
         Table(columns=["channel", "noise, 1 sigma", "unit"], rows=noise, numeric=(1,)),
         Table(
             columns=["recording", "late, ms"],
@@ -308,10 +308,6 @@ def _basis(found: Diagnosis, overlays: Sequence[Overlay]) -> Section:
     ]
     blocks += [Note(text=_sentence(note), warning=True) for note in found.notes]
     return Section(title="Basis of the diagnosis", blocks=blocks)
-
-
-def _chance(p: float) -> str:
-    return "probability below 1e-12" if p < 1e-12 else f"probability {p:.2g}"
 
 
 def _sentence(text: str) -> str:
