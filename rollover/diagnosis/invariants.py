@@ -52,9 +52,8 @@ def hard_by_bounds(fitted: Fitted) -> set[str]:
 def _may_end(id: str, name: str, value: float) -> bool:
     """Whether a number of an effect may be at that end of its range: it is a shape, or its least acts all the same."""
     kind = EFFECTS[id]
-    if name in kind.secondary or not kind.is_discontinuous or name not in kind.search:
-        return name in kind.secondary
-    return coordinate(value, kind.search[name]) < 0.5
+    acts_there = kind.is_discontinuous and name in kind.search and coordinate(value, kind.search[name]) < 0.5
+    return name in kind.secondary or acts_there
 
 
 def rejected_effects(

@@ -187,11 +187,11 @@ def hint(c: Conclusion) -> str:
     share = share_of(c.problem, c.explanation.fitted, c.problem.again(c.tried.fitted), c.groups)
     if share is None or share.low < SETTINGS.report.grades.half_share:
         return ""
-    names = " and ".join(f"{e.id} of {e.channel}" if e.channel else e.id for e in more)
+    names = " and ".join(e.spoken for e in more)
     predict = "predicts" if len(more) == 1 else "together predict"
     return (
-        f" Beside it {names} {predict} {share.share:.0%} ({share.low:.0%} to {share.high:.0%}) of what is left: a "
-        "hint, no finding, as what was fitted leaves structure or can be bent to much."
+        f" Beside it {names} {predict} {share.message('what is left')}: a hint, no finding, as what was fitted leaves "
+        "structure or can be bent to much."
     )
 
 

@@ -79,13 +79,13 @@ class Share:
     low: float
     high: float
 
-    def message(self, *, alone: bool = True) -> str:
+    def message(self, of: str = "the held-out mismatch", *, alone: bool = True) -> str:
         """In per cent with its interval, none below nought; nearly all is not said to be all, nor a little nothing.
 
         Of one of several effects, not `alone`, it is what it explains beyond the others: these need not add up to all.
         """
         share, low, high = (_percent(v) for v in (self.share, self.low, self.high))
-        return f"{share} ({low} to {high}) of the held-out mismatch{'' if alone else ', beyond the others'}"
+        return f"{share} ({low} to {high}) of {of}{'' if alone else ', beyond the others'}"
 
 
 def _percent(share: float) -> str:

@@ -184,8 +184,7 @@ def usual_model_error_sentence(
     some = ""
     if best is not None and best[1].low > 0.0:
         candidate, found = best
-        of = f" of {candidate.channel}" if candidate.channel else ""
-        some = f" Part of it is predicted by {candidate.id}{of}: {found.message()}."
+        some = f" Part of it is predicted by {candidate.spoken}: {found.message()}."
     how, most = ("a", "the references show") if taught else ("an estimated", "models usually miss")
     least = "surely predicts some" if taught else "predicts half"
     return (
@@ -249,9 +248,8 @@ def closest_candidate_sentence(found: Explanation, groups: Sequence[Sequence[int
     start, end = held_out(one.base, groups).total, held_out(one.fitted, groups).total
     if end > 0.5 * start:
         return ""
-    last = one.fitted.candidates[-1]
-    of = f" of {last.channel}" if last.channel else ""
-    return f" The closest, {last.id}{of}, leaves {end:.2f} times the noise, with structure in it."
+    closest = one.fitted.candidates[-1].spoken
+    return f" The closest, {closest}, leaves {end:.2f} times the noise, with structure in it."
 
 
 def locations(mismatch: Mismatch, dataset: Sequence[Dataset], depends: str | None) -> tuple[Location, ...]:

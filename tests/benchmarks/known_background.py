@@ -27,7 +27,6 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import diags_array
 
 from rollover.diagnosis import conclusion, diagnose
 from rollover.diagnosis.alone import verdict_on_single_effect
@@ -36,14 +35,14 @@ from rollover.diagnosis.fit.cross_validation import Groups
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
+from rollover.diagnosis.inference.slow_discrepancy import innovations
 from rollover.diagnosis.io import recordings_in
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.explanation import Explanation
 from rollover.proof.background import Background, background, unsized
-from rollover.proof.generator import Drawn, Order, drawn, make, plan
+from rollover.proof.generator import Case, Drawn, Order, drawn, make, plan
 from rollover.proof.handover import write_case
 from rollover.proof.readings import Reading, measured, rig_of
-from rollover.recording.noise_floor import grown
 from rollover.scenario import load
 
 Array = NDArray[np.float64]
@@ -104,10 +103,7 @@ def answers(case: Drawn, found: Background) -> list[dict[str, tuple[Array, Array
 
 def filtered(s: Signal, X: Array) -> Array:
     """Columns of a signal as innovations of unit variance of its quiet noise."""
-    sigma, ar = s.quiet
-    c = grown(ar) * np.array([1.0, *(-a for a in ar)])
-    W = diags_array(c, offsets=-np.arange(c.size), shape=(s.rows.size, s.rows.size))
-    return np.asarray(W @ (X / (sigma * s.heteroscedasticity * np.ones(s.rows.size))[:, None]))
+    return np.asarray(innovations(s, s.quiet[0]) @ X)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,9 +190,8 @@ class Judged:
     judge: str
 
 
-def judged(order: Order) -> Judged | None:
-    """One case, None where the diagnosis fits nothing beside an estimated discrepancy."""
-    case = make(order)
+def judged(order: Order, case: Case) -> Judged | None:
+    """The case of an order, None where the diagnosis fits nothing beside an estimated discrepancy."""
     kept: list[tuple[Problem, Explanation]] = []
 
     def listening(problem: Problem, found: Explanation, groups: Groups, **more: Any) -> tuple[Explanation, Verdict]:
@@ -238,9 +233,9 @@ def main() -> None:
     given = asked.parse_args()
     every = []
     for order in plan(given.cases, given.seed, ("foreign-form", "background"), (), given.background):
-        if not order.ids or make(order).truth["effects"][0]["over_background"] <= given.least:
+        if not order.ids or (case := make(order)).truth["effects"][0]["over_background"] <= given.least:
             continue
-        found = judged(order)
+        found = judged(order, case)
         if found is not None:
             every.append(found)
             print(found, flush=True)

@@ -49,6 +49,11 @@ class Candidate:
         suggested = [str(v) for v in self.fixed.values()]
         return ":".join([self.id, *([] if self.channel is None else [self.channel]), *suggested])
 
+    @property
+    def spoken(self) -> str:
+        """As a sentence names it: the id, with the channel of a sensor effect."""
+        return self.id if self.channel is None else f"{self.id} of {self.channel}"
+
     @cached_property
     def token(self) -> tuple[object, ...]:
         """Identity of its coordinates: candidates with the same token mean the same by them."""

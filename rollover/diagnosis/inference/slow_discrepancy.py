@@ -12,6 +12,7 @@ costs as many operations as there are samples (Rue and Held, Gaussian Markov Ran
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,14 +85,10 @@ def gram(e: Dataset, columns: Array, contact: float) -> Array:
 
 def _gram_of(e: Dataset, s: Signal, X: Array, contact: float) -> Array:
     from scipy.linalg import solveh_banded
-    from scipy.sparse import diags_array
 
     time = e.recording.time[s.rows]
     noise, ar = s.quiet
-    own = 1.0 / (np.hypot(noise, e.model_error * s.span) * s.heteroscedasticity * np.ones(time.size))
-    # the filter to innovations of variance 1, where a sample has the stated noise
-    c = grown(ar) * np.array([1.0, *(-a for a in ar)])
-    W = diags_array(c, offsets=-np.arange(c.size), shape=(time.size, time.size)) @ diags_array(own)
+    W = innovations(s, float(np.hypot(noise, e.model_error * s.span)))
     N = (W.T @ W).tocsr()  # N^-1
     back = N @ X
     G = X.T @ back
@@ -101,9 +98,19 @@ def _gram_of(e: Dataset, s: Signal, X: Array, contact: float) -> Array:
         return np.asarray(G)
     bands = _precision(time[late], g, t_c, max(len(ar), 1))
     inside = N[late][:, late]
-    for lag in range(c.size):
+    for lag in range(len(ar) + 1):
         bands[-1 - lag, lag:] += inside.diagonal(lag)
     return np.asarray(G - back[late].T @ solveh_banded(bands, back[late]))
+
+
+def innovations(s: Signal, sigma: float) -> Any:
+    """Sparse filter (n, n) of a signal to innovations of variance 1, where a sample has the noise sigma (SI)."""
+    from scipy.sparse import diags_array
+
+    ar, n = s.quiet[1], s.rows.size
+    c = grown(ar) * np.array([1.0, *(-a for a in ar)])
+    own = 1.0 / (sigma * s.heteroscedasticity * np.ones(n))
+    return diags_array(c, offsets=-np.arange(c.size), shape=(n, n)) @ diags_array(own)
 
 
 def _precision(time: Array, g: float, t_c: float, width: int) -> Array:
